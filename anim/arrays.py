@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from anim.errors import RangeError, ShapeError
+from anim.errors import DataRangeError, ShapeError
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
@@ -25,7 +25,7 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
 
     shape: one word per axis, a number for a fixed length and a letter for any: "K 3", "F N 4", "K C".
     Writable arrays, and read-only views of them, are copied; immutable ones are shared.
-    Raises ShapeError for a wrong shape or type, RangeError for NaN or infinity.
+    Raises ShapeError for a wrong shape or type, DataRangeError for NaN or infinity.
     as_floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
     """
     if isinstance(values, np.ndarray) and values.dtype.kind == "c":
@@ -37,7 +37,7 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     check_shape(array, shape, name=name)
     if not is_finite(array):
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise RangeError(f"{name} holds {array[at]} at {list(at)} (expected finite numbers)")
+        raise DataRangeError(f"{name} holds {array[at]} at {list(at)} (expected finite numbers)")
     if _is_frozen(array):
         return array
     fresh = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.dtype != array.dtype)
@@ -47,17 +47,17 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
 def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
     """Return key times (K,) in seconds as a read-only float64 array: K ≥ 1, finite, ≥ 0, increasing.
 
-    Times are strictly increasing. Raises ShapeError, or RangeError with the index of the first invalid key.
+    Times are strictly increasing. Raises ShapeError, or DataRangeError with the index of the first invalid key.
     """
     array = as_floats(values, "K", name=name)
     if len(array) == 0:
-        raise RangeError(f"{name} are empty (expected at least one key)")
+        raise DataRangeError(f"{name} are empty (expected at least one key)")
     if array[0] < 0:
-        raise RangeError(f"{name} start at {array[0]:g} s (expected 0 s or later)")
+        raise DataRangeError(f"{name} start at {array[0]:g} s (expected 0 s or later)")
     steps = np.diff(array)
     if len(steps) and steps.min() <= 0:
         k = int(np.argmax(steps <= 0)) + 1
-        raise RangeError(f"{name} not increasing at key {k} ({array[k]:g} s after {array[k - 1]:g} s)")
+        raise DataRangeError(f"{name} not increasing at key {k} ({array[k]:g} s after {array[k - 1]:g} s)")
     return array
 
 

@@ -5,6 +5,7 @@ AnimError
 ├─ UnsupportedError  the input is valid but unsupported: a required extension, a missing extra
 ├─ NotFoundError     no such clip, node, skin or mesh
 ├─ RangeError        a parameter outside its valid range
+│  └─ DataRangeError  values of a file, or results from them, outside their valid range
 ├─ ShapeError        an array of the wrong shape or type: an error of the caller
 ├─ UnstableError     a simulation that diverges: not finite, or with more energy than it can have
 └─ OutputError       the output can't be written: a full or read-only disk, no permission
@@ -68,6 +69,10 @@ class NotFoundError(AnimError):
 
 class RangeError(AnimError):
     """A parameter is outside its valid range."""
+
+
+class DataRangeError(RangeError):
+    """Values of a file, or results computed from them, are outside their valid range: no parameter is to blame."""
 
 
 class ShapeError(AnimError):

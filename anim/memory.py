@@ -39,8 +39,12 @@ class MemoryBudget:
     def add(self, size: int) -> None:
         """Count data before it is allocated. Raises UnsupportedError if the sum is above the limit."""
         self._sum += size
-        if self._sum > self.limit:
+        self.check(0)
+
+    def check(self, size: int) -> None:
+        """Raise UnsupportedError if the sum and `size` more bytes are above the limit."""
+        if self._sum + size > self.limit:
             raise UnsupportedError(
-                f"decoded data would take {self._sum / 1e9:.3g} GB or more (limit {self.limit / 1e9:.3g} GB)",
+                f"decoded data would take {(self._sum + size) / 1e9:.3g} GB or more (limit {self.limit / 1e9:.3g} GB)",
                 help="raise `memory_limit`, or split the file",
             )

@@ -11,6 +11,7 @@ from typer import TyperException
 
 from anim.errors import (
     AnimError,
+    DataRangeError,
     FormatError,
     NotFoundError,
     OutputError,
@@ -30,6 +31,7 @@ CODES: dict[type[AnimError], int] = {
     UnsupportedError: UNSUPPORTED,
     NotFoundError: NOT_FOUND,
     RangeError: USAGE,
+    DataRangeError: FORMAT,
     OutputError: FORMAT,
     UnstableError: CHECK,
 }

@@ -12,7 +12,7 @@ from anim.curves.easing import table
 from anim.curves.easing.function import Easing
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_linear, fit_segments
-from anim.errors import RangeError, check_type
+from anim.errors import DataRangeError, RangeError, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.cubic_segments import to_cubicspline, to_step, with_distinct_keys
 from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
@@ -115,6 +115,8 @@ class _Job:
         """The eased track as functions of time, its non-smooth times, and the tolerance of its approximation."""
         allowed, speed = self._allowed(track, inside)
         near = max(allowed / 2 / max(speed, allowed), MIN_TOLERANCE)
+        if not math.isfinite(near):
+            raise DataRangeError("its speed is not finite (a spline through a rotation of 0, or very large values)")
         near = 2.0 ** math.floor(math.log2(near))  # rounded, so that many tracks share few fits
         cubics = fit_segments(self.easing, tolerance=max(near, MIN_TOLERANCE))
         breaks = np.array([p.start for p in cubics[1:]])

@@ -9,6 +9,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
+from anim.memory import MemoryBudget
 from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
 from anim.operations.selection import track_indices
 from anim.sampling import derivatives
@@ -16,6 +17,7 @@ from anim.sampling.batch import Batch, batches
 from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"
+BYTES_PER_VALUE = 4 * 8  # float64, and arrays of intermediate results
 UNIT_TOLERANCE = 1e-6  # of a squared length: error by rounding to float32
 INTERPOLATIONS = (KEEP, "step", "linear", "cubicspline")
 
@@ -42,11 +44,18 @@ def resample(
     axis = TimeAxis(key_times(frame_times(clip.start, clip.end, fps=fps)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
+    _check_size(clip, list(goals), len(axis))
     values = _sample_tracks([clip.tracks[i] for i in goals], axis.times)
     new = [_keep_keys(t, _goal(t, interpolation)) if i in chosen else t for i, t in enumerate(clip.tracks)]
     for (i, goal), sampled in zip(goals.items(), values, strict=True):
         new[i] = _build_track(clip.tracks[i], goal, axis, sampled)
     return Clip(clip.name, tuple(new))
+
+
+def _check_size(clip: Clip, tracks: list[int], keys: int) -> None:
+    """Raise UnsupportedError for more values than the limit of memory allows, before any is computed."""
+    budget = MemoryBudget(sum(track.values.nbytes for track in clip.tracks))
+    budget.add(BYTES_PER_VALUE * keys * sum(clip.tracks[i].values.shape[1] for i in tracks))
 
 
 def _goal(track: Track, interpolation: str) -> Interpolation:

@@ -14,7 +14,7 @@ from anim.curves.easing import table
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_segments
-from anim.errors import RangeError, check_type
+from anim.errors import DataRangeError, RangeError, check_type
 from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
 from anim.operations.cubic_segments import with_distinct_keys
 from anim.operations.ease_track import slope
@@ -125,6 +125,8 @@ def _build_map(track: Track, easing: Easing, start: float, end: float, allowed: 
     if track.interpolation is Interpolation.STEP:
         return TimeMap(fit_segments(easing, tolerance=TOLERANCE), easing.value, start, end)
     near = allowed / 2 / max(segment.max_rate_per_second(track) * (end - start), allowed)
+    if not math.isfinite(near):
+        raise DataRangeError("its speed is not finite (a spline through a rotation of 0, or very large values)")
     near = 2.0 ** math.floor(math.log2(max(near, MIN_TOLERANCE)))  # rounded, so that many tracks share few fits
     cubics = fit_segments(easing, tolerance=max(near, MIN_TOLERANCE))
     return TimeMap(cubics, lambda u: evaluate(cubics, u), start, end)

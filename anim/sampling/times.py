@@ -12,12 +12,13 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import RangeError, check_number
+from anim.errors import DataRangeError, RangeError, check_number
 
 MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
 )
 MAX_FRAMES = 10_000_000
+MAX_USUAL_FPS = 1000.0
 MAX_MOVED_STEPS = 2  # float32 steps that a key may be moved by to differ from its neighbor
 FLOAT32_SPACING = 2.0**-23  # relative distance of neighboring float32 numbers
 MIN_JUMP_S = 1e-6  # s; shortest time between two keys that represent a jump, to avoid denormal times near 0 s
@@ -43,7 +44,8 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     check_fps(fps)
     frames = (end - start) * fps
     if frames > MAX_FRAMES:
-        raise RangeError(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
+        kind = DataRangeError if fps <= MAX_USUAL_FPS else RangeError  # the clip is too long, or the rate too high
+        raise kind(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
     sliver = max(MIN_INTERVAL_FRAMES, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)
     times = start + np.arange(whole, dtype=np.float64) / fps

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from anim.arrays import Floats
+from anim.memory import MemoryBudget
 from anim.model import Clip, FrameChunk, Skeleton
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.skinning.bound_mesh import BoundMesh
@@ -54,6 +55,7 @@ class ChunkPipeline:
 
     def _frames_per_chunk(self) -> int:
         packed = 96 * len(self.skeleton) + sum(layer.packed_size for layer in self.layers)
+        MemoryBudget(0).check(2 * LANES * packed)  # of two chunks at least
         blocks = min(CHUNK_BYTES // (12 * self.vertices * LANES), PACKED_BYTES // (packed * LANES), MAX_BLOCKS)
         return LANES * max(blocks, 1)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from enum import StrEnum
 from pathlib import PurePath
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import numpy as np
 import typer
@@ -13,6 +13,7 @@ import typer
 from anim.arrays import Floats
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
+from anim.memory import MemoryBudget
 from anim.model import Clip, Skeleton
 from anim.operations.selection import Selection
 from anim.sampling.sample import SPACES, PoseTable
@@ -26,6 +27,8 @@ from cli.reports import json_report
 from cli.text import Reporter
 
 SCHEMA = 1
+BYTES_PER_POSE = 8 * 32  # of a node: translation, rotation, scale and matrix
+BYTES_PER_NUMBER = 2  # of text to one as float64: roughly, for the numbers that are written
 
 
 class Format(StrEnum):
@@ -86,9 +89,13 @@ def command(
         clips, skeleton = reader.clips(document), reader.skeleton(document)
         numbers = selection.chosen_clips(reader.names(document))
         nodes = selection.chosen_nodes(skeleton)
-        taken = [
-            (i, clips[i], sampled(skeleton, clips[i], _times(clips[i], at, fps), space=space.value)) for i in numbers
-        ]
+        if chosen_format is Format.NPZ and len(numbers) != 1:
+            _refuse_clips(len(numbers))
+        times = {i: _times(clips[i], at, fps) for i in numbers}
+        per_number = 1 if chosen_format is Format.NPZ else BYTES_PER_NUMBER
+        budget = MemoryBudget(source.size)
+        budget.add(per_number * BYTES_PER_POSE * len(skeleton) * sum(map(len, times.values())))
+        taken = [(i, clips[i], sampled(skeleton, clips[i], times[i], space=space.value)) for i in numbers]
     if chosen_format is Format.NPZ:
         documents.write_bytes([_npz(taken, skeleton, nodes)], output)
     else:
@@ -157,11 +164,13 @@ def _short(values: Floats) -> list[float]:
     return [float(f"{value:.9g}") + 0.0 for value in values.tolist()]
 
 
-def _npz(taken: Taken, skeleton: Skeleton, nodes: list[int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    if not taken:
+def _refuse_clips(count: int) -> NoReturn:
+    if not count:
         raise NotFoundError("there is no clip")
-    if len(taken) != 1:
-        raise UsageError(f"NPZ holds one clip, but {len(taken)} are chosen", help="choose one with --clip")
+    raise UsageError(f"NPZ holds one clip, but {count} are chosen", help="choose one with --clip")
+
+
+def _npz(taken: Taken, skeleton: Skeleton, nodes: list[int]) -> np.ndarray[Any, np.dtype[np.uint8]]:
     _, clip, poses = taken[0]
     arrays: dict[str, Any] = {
         "clip": np.array(clip.name),

@@ -186,6 +186,8 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
         target = resolver.resolve_links(Path(path))
         if target.is_dir():
             raise UsageError(f"{path}: is a folder (expected a file name)")
+        if path.endswith(("/", os.sep)):
+            raise UsageError(f"{path}: there is no such folder (expected a file name)")
         if not target.parent.is_dir():
             raise UsageError(f"{path}: there is no folder '{target.parent}'")
         if target.is_file() or not target.exists():

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping, Sequence
 
 from cli.errors import UsageError
 
 FORBIDDEN = frozenset('/\\:*?"<>|')  # invalid in names on some file systems
+RESERVED = frozenset(("con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))))
+MAX_NAME_BYTES = 100  # of 255 in most file systems: the pattern may have several, and words around them
 _PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
 
 
@@ -45,4 +48,16 @@ def _filled(output: str, values: Mapping[str, str]) -> str:
 
 
 def _plain(name: str) -> str:
-    return "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ")
+    """The name as a part of a file name on every system; empty if none of it can be one."""
+    plain = "".join(c if _is_allowed(c) else "_" for c in name[:MAX_NAME_BYTES]).strip(". ")
+    short = plain.encode()[:MAX_NAME_BYTES].decode(errors="ignore").strip(". ")
+    return f"_{short}" if short.split(".")[0].strip().casefold() in RESERVED else short
+
+
+def _is_allowed(character: str) -> bool:
+    """False for what some file system refuses, or what the locale's encoding lacks."""
+    try:
+        character.encode(sys.getfilesystemencoding())
+    except UnicodeEncodeError:
+        return False
+    return character not in FORBIDDEN and character.isprintable()

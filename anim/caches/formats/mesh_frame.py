@@ -64,7 +64,8 @@ def read(data: bytes, ending: str) -> MeshFrame:
 def comment_of(head: bytes) -> dict[str, str]:
     """Return the values of this library's comment in the first bytes of a file; empty without one."""
     found = REMARK.search(head[:1024])
-    return dict(word.split("=", 1) for word in found[1].decode("ascii", "replace").split()) if found else {}
+    words = found[1].decode("ascii", "replace").split() if found else []
+    return dict(word.split("=", 1) for word in words if "=" in word)
 
 
 def _with_comment(data: bytes, opening: bytes, remark: bytes) -> bytes:
@@ -97,18 +98,27 @@ def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
         for line in data.splitlines():
             words = line.split()
             if words and words[0] in rows:
-                rows[words[0]].append([float(word) for word in words[1:4]])
+                rows[words[0]].append(_three_numbers(words))
             elif words and words[0] == b"f":
                 corners = [word.split(b"/") for word in words[1:]]
                 numbers = [_index(corner[0], len(rows[b"v"])) for corner in corners]
                 same_normals &= all(len(corner) == 3 and corner[0] == corner[2] for corner in corners)
                 faces += [[numbers[0], numbers[i], numbers[i + 1]] for i in range(1, len(numbers) - 1)]
         positions = np.array(rows[b"v"], np.float64).reshape(-1, 3)
-    except ValueError as error:
-        raise FormatError(f"is no .obj that can be read ({error})") from None
+        triangles: Ints = np.array(faces, np.int64).reshape(-1, 3)
+    except (ValueError, IndexError, OverflowError) as error:
+        raise FormatError(f"is no .obj that can be read ({str(error)[:80]})") from None
     has_normals = same_normals and len(rows[b"vn"]) == len(rows[b"v"]) > 0
     normals = np.array(rows[b"vn"], np.float32).reshape(-1, 3) if has_normals else None
-    return positions, np.array(faces, np.int64).reshape(-1, 3), normals
+    return positions, triangles, normals
+
+
+def _three_numbers(words: list[bytes]) -> list[float]:
+    """Numbers of a line "v x y z", which may have more. Raises ValueError for fewer."""
+    found = [float(word) for word in words[1:4]]
+    if len(found) != 3:
+        raise ValueError(f"{len(found)} numbers after {words[0].decode()}")
+    return found
 
 
 def _index(word: bytes, count: int) -> int:

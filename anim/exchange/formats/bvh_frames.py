@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.exchange.formats.bvh_hierarchy import fail
-from anim.exchange.formats.text import DIGIT_SEPARATOR, MAX_NUMBER
+from anim.exchange.formats.text import DIGIT_SEPARATOR, MAX_NUMBER, parse_count
 from anim.exchange.formats.text import parse_number as number_of
 
 RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100,
@@ -57,7 +57,7 @@ def _head(lines: list[str], start: int, column: int) -> tuple[int, float, int]:
     """Stated frame count, seconds per frame, and the first line (from 0) of rows, cut at its start."""
     lines[start] = lines[start][column:]
     line, found = _find(lines, start, r"\s*Frames\s*:?\s*(\d+)(?!\.?\d)", "Frames: and a whole number")
-    claimed = int(found)
+    claimed = parse_count(found)
     line, found = _find(lines, line, rf"\s*Frame\s*Time\s*:?\s*({NUMBER})(?!\S)", "Frame Time: and seconds")
     seconds = float(found)
     if not 1e-6 <= seconds <= 1e6:

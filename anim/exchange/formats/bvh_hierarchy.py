@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, NoReturn
 
 from anim.errors import FormatError
-from anim.exchange.formats.text import error_at
+from anim.exchange.formats.text import error_at, parse_count
 from anim.exchange.formats.text import parse_number as number_of
 
 CHANNELS = {f"{axis}{kind}".casefold(): (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
@@ -124,7 +124,7 @@ class _Parser:
         word = self._next("the number of CHANNELS")
         if not word.text.isascii() or not word.text.isdigit():
             fail(word.line, f"CHANNELS is followed by '{_short(word.text)}' (expected their number)")
-        for _ in range(min(int(word.text), len(self._words) + 1)):
+        for _ in range(min(parse_count(word.text), len(self._words) + 1)):
             name = self._next("a channel")
             channel = CHANNELS.get(name.text.casefold())
             if channel is None:

@@ -10,6 +10,7 @@ from anim.arrays import Floats
 from anim.errors import FormatError
 
 DIGIT_SEPARATOR = "_"  # valid in Python (1_000), but not in these formats
+MAX_COUNT = 10**15
 MAX_NUMBER = 1e15  # greatest number accepted: products of lengths in float32 do not overflow
 
 
@@ -46,6 +47,11 @@ def parse_number(text: str) -> float | None:
     if DIGIT_SEPARATOR in text:
         return None
     return value if math.isfinite(value) and abs(value) <= MAX_NUMBER else None
+
+
+def parse_count(digits: str) -> int:
+    """Return the number of a word of digits, at most MAX_COUNT: Python refuses thousands of digits."""
+    return MAX_COUNT if len(digits.lstrip("0")) >= len(str(MAX_COUNT)) else int(digits)
 
 
 def parse_cell(text: str, line: int, what: str) -> float:

@@ -79,10 +79,15 @@ def _first_word(name: str) -> str:
     return match[1] if match else ""
 
 
+def _plain_number(word: str) -> str:
+    """A word; a number without zeros before it, of any length: "01" → "1"."""
+    return word.lstrip("0") or "0" if word.isdecimal() and word.isascii() else word
+
+
 def _split_side(name: str) -> JointName:
     words = [word.casefold() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+", name)]
     side = next((SIDES[word] for word in words if word in SIDES), "")
-    stem = [str(int(word)) if word.isdecimal() else word for word in words if word not in SIDES]
+    stem = [_plain_number(word) for word in words if word not in SIDES]
     if len(stem) > 1 and stem[0] == CENTER and not side:
         stem = stem[1:]
     return JointName(side, "".join(stem))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
@@ -38,6 +38,14 @@ class Accessors:
         other = copy(self)
         other._given = {**self._given, **given}
         return other
+
+    def check_total(self, indices: Iterable[int]) -> None:
+        """Raise UnsupportedError if these accessors, each once, would take more memory than the limit allows."""
+        chosen = {index for index in indices if index not in self._given}
+        total = sum(8 * self._accessors[i]["count"] * _components(self._accessors[i]["type"]) for i in chosen)
+        views = {self._accessors[i]["bufferView"] for i in chosen if "bufferView" in self._accessors[i]}
+        packed = filter(None, (buffer_layout.compression(self._views[view]) for view in views - self._bytes.keys()))
+        self.budget.check(total + sum(each["count"] * each["byteStride"] for each in packed))
 
     def about(self, index: int) -> Json:
         """Return the JSON of an accessor."""
@@ -166,6 +174,11 @@ def _stored_bytes(document: Document) -> int:
     """Bytes of all buffers with data, a file that several use counted once."""
     sizes = {each.uri or str(i): each.byte_length for i, each in enumerate(document.buffers) if each.has_data}
     return sum(sizes.values())
+
+
+def _components(kind: str) -> int:
+    columns, rows = buffer_layout.COMPONENTS.get(kind, (0, 0))
+    return columns * rows
 
 
 def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:

@@ -65,7 +65,7 @@ class Meshes:
             _stack([part.joints for part in parts], influences, np.int64),
             _stack([part.weights for part in parts], influences, np.float64),
             np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
-            np.array(about.get("weights", [0.0] * count), float),
+            np.array(about.get("weights") or [0.0] * count, float),
             _of_all([part.normals for part in parts]),
             _targets_of_all([(part.normal_targets, part.targets) for part in parts]),
             tuple(primitive for part in parts for primitive in part.primitives),

@@ -58,6 +58,7 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     _check(document)
     accessors = accessors or Accessors(document)
     reader = animations.Reader(document, accessors)
+    accessors.check_total(_sampled_accessors(document.json))
     with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
         return tuple(_clip(i, animation, reader) for i, animation in enumerate(json_array(document.json, "animations")))
 
@@ -67,6 +68,10 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
     reader = animations.Reader(document, accessors)
     found: dict[int, Clip] = {}
     faults: list[AnimError] = []
+    try:
+        accessors.check_total(_sampled_accessors(document.json))
+    except UnsupportedError as error:
+        return {}, [error]
     with np.errstate(invalid="ignore"):
         for i, animation in enumerate(json_array(document.json, "animations")):
             try:
@@ -95,6 +100,7 @@ def scene(
     _check(document)
     check_not_required(document)
     accessors = accessors or Accessors(document)
+    accessors.check_total(_vertex_accessors(document.json))
     meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     nodes = json_array(document.json, "nodes")
@@ -184,6 +190,23 @@ def clip_name(name: str, number: int) -> str:
     return name or f"#{number}"
 
 
+def _sampled_accessors(json: Json) -> Iterator[int]:
+    """Accessors of all keys."""
+    for animation in json_array(json, "animations"):
+        for sampler in animation["samplers"]:
+            yield sampler["input"]
+            yield sampler["output"]
+
+
+def _vertex_accessors(json: Json) -> Iterator[int]:
+    """Accessors of positions and their morph targets, which are always read."""
+    for mesh in json_array(json, "meshes"):
+        for primitive in mesh["primitives"]:
+            for attributes in (primitive["attributes"], *primitive.get("targets", ())):
+                if "POSITION" in attributes:
+                    yield attributes["POSITION"]
+
+
 def _check(document: object) -> None:
     if not isinstance(document, Document):
         raise ShapeError(
@@ -214,7 +237,7 @@ def _skin(number: int, skin: Json, accessors: Accessors) -> Skin:
 
 
 def _weights_at_rest(node: Json, of_mesh: Floats) -> Floats:
-    weights = np.array(node.get("weights", of_mesh), float)
+    weights = np.array(node.get("weights") or of_mesh, float)
     if len(weights) != len(of_mesh):
         raise FormatError(f"node has {len(weights)} weights for {len(of_mesh)} morph targets")
     return weights

@@ -58,7 +58,7 @@ def validate(json: Json) -> None:
 def rules(counts: Counts) -> dict[str, Check]:
     """Return the check of each kind of object by its array's name, and of "asset"."""
     return {
-        "asset": ObjectRule({"version": _version, "minVersion": text}, ("version",)),
+        "asset": ObjectRule({"version": _version, "minVersion": _min_version}, ("version",)),
         "accessors": _accessor(counts),
         "animations": _animation(counts),
         "buffers": ObjectRule({"byteLength": at_least(1), "uri": text, "extensions": ANYTHING}, ("byteLength",)),
@@ -166,6 +166,12 @@ def _version(value: Any) -> None:
     text(value)
     if value.split(".")[0] != "2":
         raise FormatError(f"is '{value}' (expected 2.x)")
+
+
+def _min_version(value: Any) -> None:
+    text(value)
+    if value.split(".")[0] != "2":
+        raise FormatError(f"is '{value}' (expected 2.x, the version that is read)")
 
 
 def _check_channels(animation: Json) -> None:

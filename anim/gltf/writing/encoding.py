@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anim.arrays import Floats
-from anim.errors import RangeError, ShapeError, UnsupportedError
+from anim.errors import DataRangeError, ShapeError, UnsupportedError
 from anim.gltf.document import Json
 from anim.gltf.meshopt import storage
 from anim.gltf.meshopt.storage import EncodedTrack, FilteredValues
@@ -109,7 +109,7 @@ def _quantize(rows: Floats, storage: AccessorFormat) -> NDArray[Any]:
     with np.errstate(over="ignore"):
         stored: NDArray[Any] = rows.astype("<f4")
     if np.isinf(stored).any():
-        raise RangeError(f"a value of {float(np.abs(rows).max()):.3g} is too large for float32")
+        raise DataRangeError(f"a value of {float(np.abs(rows).max()):.3g} is too large for float32")
     return stored
 
 

@@ -21,6 +21,7 @@ NOISE_PER_SIZE = 1e-5  # of the model's size; smaller gaps are rounding
 VISIBLE_GAP_PER_SIZE = 1e-3  # of the model's size; larger gaps are visible
 INVISIBLE_GAP_PER_FRAME = 0.1  # of the usual motion per frame: a gap between those two is visible above this
 MAX_MISSING_FRAMES = 1.6  # gap of a clip open by one frame, relative to the motion per frame next to it
+MAX_COUNT = 10**12  # frames that indices in float64 tell apart
 MAX_FRAMES = 600  # frames that `best_ranges` compares
 MAX_STEPS = 300  # pairs of frames, and keys, that are measured inside a clip
 MIN_INTERIOR_S = 2e-4  # s, from an end to a key inside
@@ -149,8 +150,9 @@ def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind
 
 
 def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, root: int) -> Steps:
-    count = max(round((end - start) / step), 2)
-    frames = start + step * _some(np.arange(count, dtype=np.float64))
+    count = max(round(min((end - start) / step, MAX_COUNT)), 2)
+    chosen = np.linspace(0, count - 1, min(count, MAX_STEPS))
+    frames = start + step * chosen.round()
     moved = skin.steps(clip, np.minimum(np.stack((frames, frames + step)), end), root)
     keys = clip.key_times
     keys = _some(keys[(keys > start + MIN_INTERIOR_S) & (keys < end - MIN_INTERIOR_S)])

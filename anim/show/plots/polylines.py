@@ -52,6 +52,8 @@ def speed_line(track: Track) -> Polyline:
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
         return Polyline(np.zeros(0), np.zeros((0, 1)))
     times, jumps = _points(track, pieces_only=True)
+    if not len(times):  # nothing but jumps
+        return Polyline(np.zeros(0), np.zeros((0, 1)))
     speeds = np.empty(times.shape)
     speeds[:, :-1] = lengths(derivatives.rates(track, times[:, :-1].reshape(-1), before=False)).reshape(len(times), -1)
     speeds[:, -1] = lengths(derivatives.rates(track, times[:, -1], before=True))

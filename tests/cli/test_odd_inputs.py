@@ -1,0 +1,214 @@
+"""Inputs that once ended in a traceback, a wrong exit code, or a message without end."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cli.io.output_names import expand
+from fixtures.broken.pieces import animated, buffered, text
+from tests.cli.conftest import Call, Find
+from tests.cli.running import ENVIRONMENT, Run, built, refusal, shell
+
+DIGITS = "9" * 5000
+BVH = """HIERARCHY
+ROOT hip
+{
+OFFSET 0 0 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+End Site
+{
+OFFSET 0 1 0
+}
+}
+MOTION
+Frames: 2
+Frame Time: 0.1
+0 0 0
+1 2 3
+"""
+LINES = (  # of a glTF file, with codes 0 and 3 only
+    "resample IN out.glb --fps 4",
+    "resample IN out.glb --fps 4 --interpolation cubicspline",
+    "optimize IN out.glb --effort fast --jobs 1",
+    "diff IN IN",
+    "spline IN out.glb",
+    "ease IN out.glb",
+    "retime IN out.glb --warp sine-in-out",
+    "loop IN",
+    "inspect IN",
+    "check IN",
+    "plot IN out.png",
+    "sample IN --fps 4",
+)
+
+
+def run(line: str, path: Path, call: Call) -> Run:
+    words = [str(path) if each == "IN" else each for each in line.split()]
+    return call(*(str(path.with_name(each)) if each.startswith("out.") else each for each in words))
+
+
+def check_ends_well(done: Run, codes: tuple[int, ...] = (0, 3)) -> None:
+    assert done.code in codes, done.err
+    assert "Traceback" not in done.err
+    assert "Warning:" not in done.err
+    assert all(len(line) < 1100 for line in done.err.splitlines())
+
+
+def rotation_spline() -> dict[str, Any]:
+    """A spline from a rotation to its opposite, through 0."""
+    values: list[list[float]] = [[0, 0, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, -1], [0, 0, 0, 0]]
+    sampler = {"input": 0, "output": 1, "interpolation": "CUBICSPLINE"}
+    channel = {"sampler": 0, "target": {"node": 0, "path": "rotation"}}
+    return {
+        "nodes": [{"name": "a"}],
+        "scenes": [{"nodes": [0]}],
+        **buffered(("SCALAR", 5126, [0, 1]), ("VEC4", 5126, values)),
+        "animations": [{"name": "w", "samplers": [sampler], "channels": [channel]}],
+    }
+
+
+ODD = {
+    "one key": animated(times=[0], values=[[0, 0, 0]]),
+    "denormal time": animated(times=[0, 1e-45]),
+    "first key late": animated(times=[3e38], values=[[0, 0, 0]]),
+    "last key late": animated(times=[0, 3e38]),
+    "27 hours": animated(times=[0, 1e5]),
+    "large values": animated(times=[0, 1, 2], values=[[0.0, 0, 0], [3e38, 0, 0], [-3e38, 0, 0]]),
+    "rotations through 0": rotation_spline(),
+    "long names": {**animated(), "animations": [{**animated()["animations"][0], "name": "N" * 10**5}]},
+}
+
+
+@pytest.mark.parametrize("line", LINES)
+@pytest.mark.parametrize("name", ODD)
+@pytest.mark.filterwarnings("ignore:Attempting to set identical")  # of matplotlib, which `main` hides
+def test_odd_clips_are_refused_or_done(name: str, line: str, call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "a.gltf"
+    path.write_bytes(text(ODD[name]))
+    check_ends_well(run(line, path, call))
+
+
+@pytest.mark.parametrize("line", [*LINES, "bake IN out.npz --fps 4", "render IN out.png"])
+def test_an_empty_list_of_weights_is_none(line: str, asset: Find, call: Call, tmp_path: Path) -> None:
+    document = json.loads(asset("SimpleMorph.gltf").read_text())
+    path = tmp_path / "a.gltf"
+    for mesh in document["meshes"]:
+        mesh["weights"] = []
+    for node in document["nodes"]:
+        node["weights"] = []
+    path.write_text(json.dumps(document))
+    check_ends_well(run(line, path, call), (0,))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        BVH.replace("CHANNELS 3", f"CHANNELS {DIGITS}"),
+        BVH.replace("Frames: 2", f"Frames: {DIGITS}"),
+        BVH.replace("0.1", "1e-320"),
+        BVH.replace("OFFSET 0 1 0", f"OFFSET 0 {DIGITS} 0"),
+    ],
+    ids=["channels", "frames", "frame time", "offset"],
+)
+def test_numbers_of_thousands_of_digits_are_refused(data: str, call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(data)
+    refusal(call("from-euler", tmp_path / "a.bvh", tmp_path / "out.glb"), 3)
+
+
+def test_names_of_thousands_of_digits_are_names(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(BVH.replace("hip", f"hip{DIGITS}"))
+    (tmp_path / "arm.glb").write_bytes(built("arm"))
+    done = call("from-euler", tmp_path / "a.bvh", tmp_path / "out.glb", "--onto", tmp_path / "arm.glb")
+    check_ends_well(done, (0, 3, 5))
+
+
+@pytest.mark.parametrize(
+    ("lines", "code"),
+    [
+        ("# gltf-anim time=0\x1cup\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 0),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 1\nvn 0 0 1\nvn 0 0 1\nf 1//1 2//2 3//3\n", 3),
+        (f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {'9' * 30}\n", 3),
+        (f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {DIGITS}\n", 3),
+        ("v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 3),
+        (f"v 0 0 0\nf {'[]' * 1000}\n", 3),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf\nf /\n", 3),
+    ],
+)
+def test_odd_lines_of_obj(lines: str, code: int, call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(lines)
+    check_ends_well(call("convert-cache", tmp_path / "a.obj", tmp_path / "out.npz"), (code,))
+
+
+def test_a_file_of_a_later_version_is_refused(asset: Find, call: Call, tmp_path: Path) -> None:
+    document = json.loads(asset("SimpleSkin.gltf").read_text())
+    document["asset"]["minVersion"] = "9.0"
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    assert "asset.minVersion: is '9.0'" in refusal(call("convert", tmp_path / "a.gltf", tmp_path / "out.glb"), 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("CON", "_CON.npz"),
+        ("com1", "_com1.npz"),
+        ("nul.txt", "_nul.txt.npz"),
+        ("lpt9 ", "_lpt9.npz"),
+        ("console", "console.npz"),
+        ("a" * 300, f"{'a' * 100}.npz"),
+        ("ä" * 300, f"{'ä' * 50}.npz"),
+        ("..", "7.npz"),
+    ],
+)
+def test_names_of_clips_as_names_of_files(name: str, expected: str) -> None:
+    assert expand("{clip}.npz", [{"clip": name}], [7]) == [expected]
+
+
+def test_a_folder_that_is_not_there_is_no_file_name(call: Call, walk: Path, tmp_path: Path) -> None:
+    said = refusal(call("resample", walk, f"{tmp_path}/new/", "--fps", "4"), 2)
+    assert "there is no such folder" in said
+    assert list(tmp_path.iterdir()) == [walk]
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "words"),
+    [
+        ("resample IN out.glb --fps 1e6", 4, "would take"),
+        ("sample IN out.npz --fps 1e5", 2, "NPZ holds one clip"),
+        ("sample IN out.json --fps 1e6", 4, "would take"),
+        ("resample IN out.glb --fps 1e9", 2, "frames at 1e+09 fps"),
+    ],
+)
+def test_many_keys_are_counted_before_they_are_computed(
+    line: str, code: int, words: str, call: Call, walk: Path
+) -> None:
+    assert words in refusal(run(line, walk, call), code)
+
+
+@pytest.mark.parametrize("locale", [{}, {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}])
+def test_names_beyond_ascii_in_an_ascii_locale(locale: dict[str, str], tmp_path: Path) -> None:
+    document = animated()
+    document["nodes"][0]["name"] = "Hüfte★"
+    document["animations"][0]["name"] = "läuft"
+    (tmp_path / "a.gltf").write_bytes(text(document))
+    settings = " ".join(f"{key}={value}" for key, value in {"LC_ALL": "C", **locale}.items())
+    for line in ("plot a.gltf out.png", "inspect a.gltf", "resample a.gltf out.gltf --fps 4"):
+        check_ends_well(shell(f"{settings} gltf-anim {line}", tmp_path), (0,))
+    (tmp_path / "arm.glb").write_bytes(built("arm").replace(b'"bend"', '"bä"'.encode().ljust(6)))
+    check_ends_well(shell(f"{settings} gltf-anim bake arm.glb '{{clip}}.npz' --fps 4", tmp_path), (0,))
+
+
+@pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full"])
+def test_a_refusal_has_its_code_even_unsaid(redirection: str, tmp_path: Path) -> None:
+    assert shell(f"gltf-anim convert none.glb out.glb {redirection}", tmp_path).code == 3
+
+
+@pytest.mark.parametrize("option", ["--help", "--version", "resample --help"])
+def test_a_full_disk_takes_no_help(option: str, tmp_path: Path) -> None:
+    assert os.environ.keys() & ENVIRONMENT.keys()
+    done = shell(f"gltf-anim {option} > /dev/full", tmp_path)
+    assert "stdout: can't be written (no space left on device)" in refusal(done, 3)
