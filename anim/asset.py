@@ -19,7 +19,7 @@ from anim.errors import AnimError, FormatError, RangeError, ShapeError, check_ty
 from anim.files import resolver
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
-from anim.gltf.document import Document, json_array
+from anim.gltf.document import Document, copy_json, json_array
 from anim.gltf.io import container, json_text
 from anim.gltf.io.source import Source, glb_chunks, open_bytes, open_file, write_file
 from anim.gltf.reading import reader
@@ -100,7 +100,7 @@ class Asset:
             if changed is not old:
                 new[i] = changed
         if not new:
-            return self
+            return self._copy()
         document = writer.replace_clips(container.check_edits(self.document), new)
         return replace(self, document=_rename(document, {i: clip.name for i, clip in new.items()}))
 
@@ -120,8 +120,16 @@ class Asset:
                 raise RangeError(
                     f"clips[{i}] has a track of node {strange[0]} (the asset has {count} nodes, from 0 on)"
                 )
-        document = add_clips(container.check_edits(self.document), new)
-        return self if document is self.document else replace(self, document=document)
+        document = container.check_edits(self.document)
+        longer = add_clips(document, new)
+        return self._copy() if longer is document else replace(self, document=longer)
+
+    def _copy(self) -> Asset:
+        """Return an equal asset with JSON of its own; an unchanged one still has the bytes it was read from."""
+        document, source = replace(self.document, json=copy_json(self.document.json)), self.source
+        if source is not None and source.document is self.document:
+            source = replace(source, document=document)
+        return Asset(document, source)
 
     def save(self, path: PathName | BinaryIO) -> None:
         """Write the asset, as `anim.save` does."""

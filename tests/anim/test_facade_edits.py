@@ -48,6 +48,30 @@ def test_a_buffer_appended_to_the_json_is_saved(
     assert [accessor["count"] for accessor in again.json["accessors"]].count(6) >= 1
 
 
+NO_CHANGE: dict[str, Callable[[anim.Asset], anim.Asset]] = {
+    "map_clips": lambda asset: asset.map_clips(lambda clip: clip),
+    "add_clips": lambda asset: asset.add_clips([]),
+}
+
+
+@pytest.mark.parametrize("name", NO_CHANGE)
+def test_edits_of_a_new_asset_leave_the_old_one_even_if_no_clip_changed(name: str, biped: Path) -> None:
+    asset, out = anim.load(biped), io.BytesIO()
+    same = NO_CHANGE[name](asset)
+    same.save(out)
+    assert out.getvalue() == biped.read_bytes()
+    same.document.json["nodes"][0]["name"] = "pelvis"
+    assert asset.document.json["nodes"][0]["name"] == "hips"
+
+
+@pytest.mark.parametrize("name", NO_CHANGE)
+def test_a_new_asset_has_the_clips_of_the_edited_json_even_if_none_changed(name: str, biped: Path) -> None:
+    asset = anim.load(biped)
+    assert asset.clips.names == ("walk", "wave", "jump")
+    del asset.document.json["animations"][1]
+    assert NO_CHANGE[name](asset).clips.names == ("walk", "jump")
+
+
 BROKEN: dict[str, tuple[Callable[[Any], object], str]] = {
     "sampler": (lambda j: j["animations"][0]["channels"][0].update(sampler=999), "animations[0].channels[0].sampler"),
     "negative": (lambda j: j["animations"][0]["channels"][0].update(sampler=-1), "animations[0].channels[0].sampler"),
