@@ -83,7 +83,8 @@ def meters(value: str | float, name: str, scale: Callable[[], float], *, at_leas
         return length
     check_number(value, name)
     if not math.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
-        raise RangeError(f"{name} is {value} (expected metres above 0, or a length like '0.5mm' or '0.1%')")
+        least = "above 0" if at_least is None else f"from {at_least:g}"
+        raise RangeError(f"{name} is {value} (expected metres {least}, or a length like '0.5mm' or '0.1%')")
     return float(value)
 
 

@@ -47,6 +47,7 @@ WRONG: dict[str, tuple[Call, type[anim.AnimError], str]] = {
     "bake file": (lambda asset: anim.bake(asset).save(_any(io.BytesIO())), anim.ShapeError, "path is BytesIO"),
     "error None": (lambda asset: anim.optimize(asset, max_error=_any(None)), anim.ShapeError, "`max_error` is None"),
     "error True": (lambda asset: anim.optimize(asset, max_error=True), anim.ShapeError, "`max_error` is True"),
+    "error -1": (lambda asset: anim.optimize(asset, max_error=-1), anim.RangeError, "metres from 0, or a length"),
     "error 1": (lambda asset: anim.optimize(asset, max_error="1"), anim.RangeError, "without a unit"),
     "error 1e-3": (lambda asset: anim.optimize(asset, max_error=" 1e-3 "), anim.RangeError, "without a unit"),
     "speed 1.": (lambda asset: anim.optimize(asset, max_speed_error="1."), anim.RangeError, "without a unit"),
