@@ -51,7 +51,7 @@ def text(report: CheckReport) -> str:
         lines += [f"  {each.severity:7}  {code} {each.name}  {each.where}: {each.problem}" for each in shown]
         if len(shown) < len(found):
             lines.append(f"           and {len(found) - len(shown)} more of this rule (all: --format json)")
-        lines.append(f"           {found[0].advice}")
+        lines += [f"           {advice}" for advice in dict.fromkeys(each.advice for each in shown)]
     lines += ["", summary(report)] if lines else [summary(report)]
     return "\n".join(map(escape_control, lines)) + "\n"
 

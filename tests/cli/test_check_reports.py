@@ -5,7 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
+from anim.check.baseline import FileFinding
+from anim.check.finding import Finding, Severity
 from anim.check.registry import RULES
+from cli.reports import check_report
 from tests.cli.conftest import Call
 from tests.cli.running import built
 
@@ -49,6 +52,18 @@ def test_markdown_is_a_table_that_names_cannot_break(folder: Path, call: Call) -
     (folder / "<a|b>&.glb").write_bytes(built("noop"))
     out = call("check", "<a|b>&.glb", "--format", "md", "--select", "GA103").text
     assert "| &#60;a&#124;b&#62;&#38;.glb | info |" in out
+
+
+def test_text_has_the_advice_of_every_finding_it_shows() -> None:
+    def found(number: int, advice: str) -> FileFinding:
+        return "a.glb", Finding("loop-seam", Severity.WARNING, f"clip '{number}'", "jumps", advice, "GA107")
+
+    two = [found(i, f"loop IN OUT --clip '#{i}'") for i in (6, 7)]
+    shown = check_report.text(check_report.CheckReport(["a.glb"], two, []))
+    assert "--clip '#6'\n" in shown
+    assert "--clip '#7'\n" in shown
+    same = [found(i, "loop IN OUT") for i in (6, 7)]
+    assert check_report.text(check_report.CheckReport(["a.glb"], same, [])).count("loop IN OUT") == 1
 
 
 def test_every_rule_is_listed_and_explained(call: Call) -> None:
