@@ -64,6 +64,10 @@ class Births:
     def __len__(self) -> int:
         return len(self.times)
 
+    def at(self, rows: Ints) -> Births:
+        """Return some of the particles."""
+        return Births(self.times[rows], self.deaths[rows], self.positions[rows], self.velocities[rows])
+
 
 def emit(
     scene: Scene, clip: Clip, emitter: Emitter, start: float, end: float, seed: int, clip_start: float = 0.0

@@ -95,8 +95,10 @@ def pack_forces(
     x, y, z = (float(value) for value in forces.gravity)
     wind = (float(forces.wind[0]), float(forces.wind[1]), float(forces.wind[2]))
     waves, amplitudes, rates, phases = forces.turbulence_modes(period)
-    modes = np.concatenate([waves, amplitudes, rates[:, None], phases[:, None]], axis=1)
+    modes = np.ascontiguousarray(np.concatenate([waves, amplitudes, rates[:, None], phases[:, None]], axis=1).T)
     pulls = np.array([[each.strength, each.radius] for each in attractors], np.float64).reshape(-1, 2)
     uniform = UniformForces((x, y, z), float(forces.linear_drag), float(forces.quadratic_drag), wind)
     is_uniform = not forces.turbulence and not attractors
-    return ForceField(uniform, modes, pulls, np.ascontiguousarray(centers), step, first, is_uniform)
+    return ForceField(
+        uniform, modes, np.empty(len(phases)), pulls, np.ascontiguousarray(centers), step, first, is_uniform
+    )

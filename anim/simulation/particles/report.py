@@ -31,10 +31,14 @@ def make_report(
     *,
     num_nodes: int,
     error: float | None = None,
+    num_estimated: int = 0,
     seam: float | None = None,
     reduction: float | None = None,
 ) -> SimulationReport:
-    """Return the report of a run. error: m, of half the step. seam: m. reduction: m, error of the removal of keys."""
+    """Return the report of a run.
+
+    error: m, of half the step, of `num_estimated` particles. seam: m. reduction: m, error of the removal of keys.
+    """
     value, limit, advice = _stability(options, steps.step_s, keys.max_speed)
     energy = options.mass * keys.energies[:, 1:].sum(axis=1)
     figures = {
@@ -45,6 +49,7 @@ def make_report(
         "born_inside": keys.num_inside,
         "max_speed_m_s": keys.max_speed,
         "max_step_m": keys.max_speed * steps.step_s,
+        "estimated_particles": num_estimated,
     }
     if reduction is not None:
         figures["max_error_m"] = reduction

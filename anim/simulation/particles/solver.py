@@ -92,12 +92,14 @@ class ParticleSolver:
         from anim.simulation.particles.kernels.contact import Grid
         from anim.simulation.particles.kernels.force_field import METHODS
         from anim.simulation.particles.kernels.particle_run import STATISTICS, run_particles
+        from anim.simulation.particles.kernels.solids import MOVING
 
         first = -steps.num_warm_up_steps
         times: Floats = np.arange(first, steps.num_steps + 1, dtype=np.float64) * steps.step_s
         motion = self._motion
         drive = None if motion is None else lambda nodes: motion.at(times, nodes)
         field = pack_forces(self._forces, self._attractors, steps.step_s, first, drive, self._period)
+        solids = pack_obstacles(self._obstacles, drive)
         grid = Grid(
             steps.step_s,
             first,
@@ -108,11 +110,11 @@ class ParticleSolver:
             METHODS.index("velocity-verlet" if self._integrator == "verlet" else self._integrator),
             not self._is_exact,
             not self._forces.turbulence and not self._attractors,
+            not self._is_exact and not solids.shapes[:, MOVING].any(),
             float(self._contact.restitution),
             float(self._contact.friction),
         )
         births = self._births
-        solids = pack_obstacles(self._obstacles, drive)
         positions, velocities = np.ascontiguousarray(births.positions), np.ascontiguousarray(births.velocities)
         keys, offsets, energies, found = run_particles(
             births.times, births.deaths, positions, velocities, field, solids, grid

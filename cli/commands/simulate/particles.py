@@ -232,7 +232,9 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
         f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
     ]
     if report.error_estimate_m and report.error_estimate_m > ROUNDING_M:
-        parts.append(text.format_step_error(report.error_estimate_m))
+        estimated = figures["estimated_particles"]
+        of_some = f" ({estimated} particles compared)" if estimated < figures["particles"] else ""
+        parts.append(text.format_step_error(report.error_estimate_m) + of_some)
     if report.loop_seam_m is not None:
         parts.append(f"seam of the loop {text.format_length(report.loop_seam_m)}")
     if has_nodes and "max_error_m" in figures:

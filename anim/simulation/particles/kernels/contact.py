@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from anim.simulation.particles.kernels.force_field import ForceField, acceleration
+from anim.simulation.particles.kernels.force_field import ForceField, acceleration, air_velocity
 from anim.simulation.particles.kernels.solids import (
     Solids,
     distance,
@@ -26,7 +26,8 @@ class Grid(NamedTuple):
 
     step: s. first: index of the first step; those before 0 are not written. num_steps: from 0 on. duration: s.
     substeps: of a frame. method: index in METHODS. has_frames: write a key per frame; else paths are parabolas between
-    events. can_sleep: forces don't change with time.
+    events. can_sleep: forces don't change with time. can_rest: obstacles don't move, so that a particle at rest on one
+    needs no key per frame.
     """
 
     step: float
@@ -37,6 +38,7 @@ class Grid(NamedTuple):
     method: int
     has_frames: bool
     can_sleep: bool
+    can_rest: bool
     restitution: float
     friction: float
 
@@ -92,7 +94,7 @@ def slide_surface(
     The velocity loses what points into the surface at the end of the step, and Coulomb's friction acts on its impulse.
     """
     f1 = f0 + h / grid.step
-    v1 = add(v, h, acceleration(field, t, x, v))
+    v1 = add(v, h, acceleration(field, t, x, v, air_velocity(field, t, x)))
     x1 = add(x, h, v1)
     face, moving = normal(solids, k, i, f1, x1), surface_velocity(solids, k, i, f1, grid.step, x1)
     relative = add(v1, -1.0, moving)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from anim.arrays import Floats
+from anim.simulation.particles.kernels.turbulence import turbulent_velocity
 from anim.simulation.particles.kernels.vectors import Vector, add, dot, length
-from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.jit import inline, jit
 
 METHODS = ("explicit-euler", "symplectic-euler", "velocity-verlet", "rk4", "implicit-euler")  # their codes are indices
 
@@ -26,13 +25,15 @@ class UniformForces(NamedTuple):
 class ForceField(NamedTuple):
     """All forces of a run.
 
-    modes: (M, 8) of the turbulence: wave vector in 1/m, amplitude in m/s, rate in 1/s, phase. attractors: (A, 2),
-    strength in m/s² at the radius in m. centers: (S, A, 3) m at the ends of steps, or (1, A, 3). step: s. first: index
-    of the step that begins at centers[0]. is_uniform: without turbulence and attractors.
+    modes: (8, M) of the turbulence: wave vector in 1/m, amplitude in m/s, rate in 1/s, phase. scratch: (M,), of
+    `turbulent_velocity`. attractors: (A, 2), strength in m/s² at the radius in m. centers: (S, A, 3) m at the ends of
+    steps, or (1, A, 3). step: s. first: index of the step that begins at centers[0]. is_uniform: without turbulence and
+    attractors.
     """
 
     uniform: UniformForces
     modes: Floats
+    scratch: Floats
     attractors: Floats
     centers: Floats
     step: float
@@ -41,9 +42,15 @@ class ForceField(NamedTuple):
 
 
 @jit
-def uniform_acceleration(forces: UniformForces, t: float, x: Vector, v: Vector) -> Vector:
-    """Return the acceleration in m/s² by gravity and drag."""
-    relative = add(v, -1.0, forces.wind)
+def uniform_air(forces: UniformForces, t: float, x: Vector) -> Vector:
+    """Return the velocity of the air in m/s: the wind."""
+    return forces.wind
+
+
+@jit
+def uniform_acceleration(forces: UniformForces, t: float, x: Vector, v: Vector, air: Vector) -> Vector:
+    """Return the acceleration in m/s² by gravity and drag. air: its velocity in m/s."""
+    relative = add(v, -1.0, air)
     factor = forces.linear_drag
     if forces.quadratic_drag > 0.0:
         factor += forces.quadratic_drag * length(relative)
@@ -51,27 +58,19 @@ def uniform_acceleration(forces: UniformForces, t: float, x: Vector, v: Vector) 
 
 
 @jit
-def acceleration(field: ForceField, t: float, x: Vector, v: Vector) -> Vector:
-    """Return the acceleration in m/s² by all forces at t s."""
-    a = uniform_acceleration(field.uniform, t, x, add(v, -1.0, air_motion(field, t, x)))
+def air_velocity(field: ForceField, t: float, x: Vector) -> Vector:
+    """Return the velocity of the air in m/s: wind and turbulence."""
+    return turbulent_velocity(field.modes, field.scratch, t, x, field.uniform.wind)
+
+
+@jit
+def acceleration(field: ForceField, t: float, x: Vector, v: Vector, air: Vector) -> Vector:
+    """Return the acceleration in m/s² by all forces at t s. air: its velocity in m/s."""
+    a = uniform_acceleration(field.uniform, t, x, v, air)
     for k in range(len(field.attractors)):
         towards = add(attractor_center(field, k, t), -1.0, x)
         a = add(a, pull_per_metre(field.attractors[k, 0], field.attractors[k, 1], length(towards)), towards)
     return a
-
-
-@jit
-def air_motion(field: ForceField, t: float, x: Vector) -> Vector:
-    """Return the velocity of the air relative to the wind: random Fourier modes at right angles to their waves."""
-    ux = uy = uz = 0.0
-    modes = field.modes
-    for m in range(len(modes)):
-        wave = modes[m, 0] * x[0] + modes[m, 1] * x[1] + modes[m, 2] * x[2]
-        c = np.cos(wave + modes[m, 6] * t + modes[m, 7])
-        ux += c * modes[m, 3]
-        uy += c * modes[m, 4]
-        uz += c * modes[m, 5]
-    return (ux, uy, uz)
 
 
 @jit
@@ -103,14 +102,14 @@ def potential(field: ForceField, t: float, x: Vector) -> float:
 
 
 @jit
-def uniform_implicit_change(forces: UniformForces, t: float, x: Vector, v: Vector, h: float) -> Vector:
+def uniform_implicit_change(forces: UniformForces, t: float, x: Vector, v: Vector, h: float, air: Vector) -> Vector:
     """Return the change of velocity of one Newton step of implicit Euler under uniform forces."""
-    a = uniform_acceleration(forces, t, x, v)
-    return _solve(forces, add(v, -1.0, forces.wind), (h * a[0], h * a[1], h * a[2]), h, 0.0)
+    a = uniform_acceleration(forces, t, x, v, air)
+    return _solve(forces, add(v, -1.0, air), (h * a[0], h * a[1], h * a[2]), h, 0.0)
 
 
 @jit
-def implicit_change(field: ForceField, t: float, x: Vector, v: Vector, h: float) -> Vector:
+def implicit_change(field: ForceField, t: float, x: Vector, v: Vector, h: float, air: Vector) -> Vector:
     """Return the change of velocity of one Newton step of implicit Euler.
 
     It solves (I − h ∂a/∂v − h² ∂a/∂x) dv = h (a + h ∂a/∂x v), where attractors count without the part of their gradient
@@ -120,9 +119,8 @@ def implicit_change(field: ForceField, t: float, x: Vector, v: Vector, h: float)
     for k in range(len(field.attractors)):
         towards = add(attractor_center(field, k, t), -1.0, x)
         stiffness += max(pull_per_metre(field.attractors[k, 0], field.attractors[k, 1], length(towards)), 0.0)
-    a = add(acceleration(field, t, x, v), -h * stiffness, v)
-    relative = add(add(v, -1.0, field.uniform.wind), -1.0, air_motion(field, t, x))
-    return _solve(field.uniform, relative, (h * a[0], h * a[1], h * a[2]), h, stiffness)
+    a = add(acceleration(field, t, x, v, air), -h * stiffness, v)
+    return _solve(field.uniform, add(v, -1.0, air), (h * a[0], h * a[1], h * a[2]), h, stiffness)
 
 
 @jit
@@ -135,37 +133,51 @@ def _solve(forces: UniformForces, relative: Vector, right: Vector, h: float, sti
     return add((right[0] / diagonal, right[1] / diagonal, right[2] / diagonal), -along / diagonal, relative)
 
 
-def _integrator(force: Callable[..., Vector], change: Callable[..., Vector]) -> Callable[..., tuple[Vector, Vector]]:
-    """Return the function of one step for forces with this acceleration, and this change by implicit Euler."""
+def _integrator(
+    air_at: Callable[..., Vector], force: Callable[..., Vector], change: Callable[..., Vector]
+) -> Callable[..., tuple[Vector, Vector, Vector]]:
+    """Return the function of one step in this air, with this acceleration, and this change by implicit Euler.
+
+    The default method has its forces inlined, which halves its time; that of all would double the time to compile.
+    """
+    inlined_air, inlined_force = inline(air_at.py_func), inline(force.py_func)  # type: ignore[attr-defined]
 
     @jit
-    def integrate(forces: Any, method: int, t: float, x: Vector, v: Vector, h: float) -> tuple[Vector, Vector]:
-        """Return position and velocity at t + h by METHODS[method]."""
+    def integrate(
+        forces: Any, method: int, t: float, x: Vector, v: Vector, h: float, air: Vector
+    ) -> tuple[Vector, Vector, Vector]:
+        """Return position, velocity, and that of the air, at t + h by METHODS[method]. air: its velocity at t."""
         if method == 0:
-            return add(x, h, v), add(v, h, force(forces, t, x, v))
-        if method == 1:
-            v = add(v, h, force(forces, t, x, v))
-            return add(x, h, v), v
-        if method == 2:
-            half = add(v, 0.5 * h, force(forces, t, x, v))
-            x = add(x, h, half)
-            return x, add(half, 0.5 * h, force(forces, t + h, x, half))
-        if method == 3:
-            a1 = force(forces, t, x, v)
+            v1 = add(v, h, force(forces, t, x, v, air))
+            x1 = add(x, h, v)
+        elif method == 1:
+            v1 = add(v, h, force(forces, t, x, v, air))
+            x1 = add(x, h, v1)
+        elif method == 2:
+            half = add(v, 0.5 * h, inlined_force(forces, t, x, v, air))
+            x1 = add(x, h, half)
+            air = inlined_air(forces, t + h, x1)
+            return x1, add(half, 0.5 * h, inlined_force(forces, t + h, x1, half, air)), air
+        elif method == 3:
+            a1 = force(forces, t, x, v, air)
             v2 = add(v, 0.5 * h, a1)
-            a2 = force(forces, t + 0.5 * h, add(x, 0.5 * h, v), v2)
+            at = add(x, 0.5 * h, v)
+            a2 = force(forces, t + 0.5 * h, at, v2, air_at(forces, t + 0.5 * h, at))
             v3 = add(v, 0.5 * h, a2)
-            a3 = force(forces, t + 0.5 * h, add(x, 0.5 * h, v2), v3)
+            at = add(x, 0.5 * h, v2)
+            a3 = force(forces, t + 0.5 * h, at, v3, air_at(forces, t + 0.5 * h, at))
             v4 = add(v, h, a3)
-            a4 = force(forces, t + h, add(x, h, v3), v4)
-            dx = add(add(add(v, 2.0, v2), 2.0, v3), 1.0, v4)
-            dv = add(add(add(a1, 2.0, a2), 2.0, a3), 1.0, a4)
-            return add(x, h / 6, dx), add(v, h / 6, dv)
-        v = add(v, 1.0, change(forces, t, x, v, h))
-        return add(x, h, v), v
+            at = add(x, h, v3)
+            a4 = force(forces, t + h, at, v4, air_at(forces, t + h, at))
+            x1 = add(x, h / 6, add(add(add(v, 2.0, v2), 2.0, v3), 1.0, v4))
+            v1 = add(v, h / 6, add(add(add(a1, 2.0, a2), 2.0, a3), 1.0, a4))
+        else:
+            v1 = add(v, 1.0, change(forces, t, x, v, h, air))
+            x1 = add(x, h, v1)
+        return x1, v1, air_at(forces, t + h, x1)
 
     return integrate
 
 
-integrate = _integrator(acceleration, implicit_change)
-integrate_uniform = _integrator(uniform_acceleration, uniform_implicit_change)
+integrate = _integrator(air_velocity, acceleration, implicit_change)
+integrate_uniform = _integrator(uniform_air, uniform_acceleration, uniform_implicit_change)

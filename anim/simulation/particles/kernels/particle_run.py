@@ -11,6 +11,7 @@ from anim.simulation.particles.kernels.contact import ORIGIN, Grid, respond, sli
 from anim.simulation.particles.kernels.force_field import (
     ForceField,
     acceleration,
+    air_velocity,
     integrate,
     integrate_uniform,
     potential,
@@ -29,7 +30,7 @@ from anim.simulation.particles.kernels.solids import (
     surface_velocity,
 )
 from anim.simulation.particles.kernels.vectors import Vector, add, dot, hermite, hermite_velocity, length
-from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.jit import inline, jit
 
 MAX_SPEED_M_S = 1e5  # beyond, the run is called unstable
 STATISTICS = ("impacts", "max_speed", "penetration", "bad_step", "bad_speed", "energy_change", "kinetic_s", "inside")
@@ -77,12 +78,15 @@ def run_particles(
     return keys[: count[0]], offsets, energies, statistics
 
 
-@jit
+@inline
 def _run_particle(
     keys: Floats, count: Ints, birth: float, death: float, x: Vector, v: Vector,
     field: ForceField, solids: Solids, grid: Grid, energies: Floats, statistics: Floats,
 ) -> Floats:  # fmt: skip
-    """Simulate one particle from birth to death; return the keys, with room for more if they ran out."""
+    """Simulate one particle from birth to death; return the keys, with space for more if they ran out.
+
+    Inlined, as a function of its own would take a second more to compile.
+    """
     h = grid.step
     n = max(int(np.floor(birth / h)), grid.first)
     n += 1 if (n + 1) * h <= birth else 0
@@ -90,17 +94,17 @@ def _run_particle(
     resting, face, ignored = -1, ORIGIN, _containing(solids, n - grid.first, birth / h - n, x)
     is_asleep, has_begun = False, birth >= 0.0
     statistics[7] += 1.0 if ignored else 0.0
+    keys = grow(keys, count)
     if has_begun:
-        keys = grow(keys, count)
         write_key(keys, count, birth, x, v, v)
     first_energy = 0.5 * dot(v, v) + potential(field, birth, x)
     while n < grid.num_steps:
+        keys = grow(keys, count)
         if n >= statistics[3]:
             return keys
         start, end = max(birth, n * h), grid.duration if n == grid.num_steps - 1 else (n + 1) * h
         stop = min(end, death)
         if n == 0 and not has_begun:
-            keys = grow(keys, count)
             write_key(keys, count, 0.0, x, v, v)
             first_energy = 0.5 * dot(v, v) + potential(field, 0.0, x)
         if n == 0 and birth <= 0.0:
@@ -113,14 +117,19 @@ def _run_particle(
             if n > begun:
                 ignored = 0
                 if grid.has_frames and n > 0 and n % grid.substeps == 0:
-                    keys = grow(keys, count)
                     write_key(keys, count, n * h, x, v, v)
                 if n == last:
                     continue
                 start, end = n * h, grid.duration if n == grid.num_steps - 1 else (n + 1) * h
                 stop = min(end, death)
+        if resting >= 0 and grid.can_rest and length(v) == 0.0 and start == n * h and is_flat(solids, resting):
+            last = min(grid.num_steps - 1, int(np.ceil(death / h)) - 1) if n >= 0 else 0
+            begun, n = n, _rest(field, grid, face, n, last, x, energies)
+            if n > begun:
+                if n > 0:
+                    write_key(keys, count, n * h, x, v, v)
+                continue
         if not is_asleep:
-            keys = grow(keys, count)
             before = count[0]
             x, v, resting, face, ignored, is_asleep = _advance(
                 State(x, v, resting, face, ignored, False), keys, count, n, start, stop - start,
@@ -145,10 +154,8 @@ def _run_particle(
             statistics[6] += 0.5 * dot(v, v) * h * grid.substeps
             has_key = grid.has_frames or (resting >= 0 and not is_flat(solids, resting))
             if n < grid.num_steps and has_key and not is_asleep:
-                keys = grow(keys, count)
                 write_key(keys, count, end, x, v, v)
     finish = min(death, grid.duration)
-    keys = grow(keys, count)
     write_key(keys, count, finish, x, v, v)
     statistics[5] += 0.5 * dot(v, v) + potential(field, finish, x) - first_energy
     return keys
@@ -165,7 +172,7 @@ def _advance(
     for _ in range(MAX_IMPACTS_PER_STEP):
         span, asleep, stops = h, False, False
         if resting < 0:
-            x1, v1 = integrate(field, grid.method, t, x, v, h)
+            x1, v1, _ = integrate(field, grid.method, t, x, v, h, air_velocity(field, t, x))
         elif not is_flat(solids, resting):
             on_surface, x1, v1 = slide_surface(resting, i, t / grid.step - n, t, h, x, v, field, solids, grid)
             if not on_surface:
@@ -173,7 +180,7 @@ def _advance(
                 resting = -1
                 continue
         else:
-            a = acceleration(field, t, x, v)
+            a = acceleration(field, t, x, v, air_velocity(field, t, x))
             if dot(a, face) > 0.0:
                 resting = -1
                 continue
@@ -199,7 +206,7 @@ def _advance(
         face = normal(solids, hit, i, f, x)
         x = add(x, max(-distance(solids, hit, i, f, x), 0.0), face)
         t += u * span
-        a = acceleration(field, t, x, before)
+        a = acceleration(field, t, x, before, air_velocity(field, t, x))
         moving = surface_velocity(solids, hit, i, f, grid.step, x)
         v, stays = respond(before, moving, face, a, grid)
         resting = hit if stays else -1
@@ -237,11 +244,12 @@ def _fly(
     h, method, substeps, first = grid.step, grid.method, grid.substeps, grid.first
     num_shapes, end = len(shapes), len(poses) - 1
     uniform, fastest, kinetic = field.uniform, statistics[1], 0.0
+    air = uniform.wind if field.is_uniform else air_velocity(field, n * h, x)
     while n < last:
         if field.is_uniform:
-            x1, v1 = integrate_uniform(uniform, method, n * h, x, v, h)
+            x1, v1, after = integrate_uniform(uniform, method, n * h, x, v, h, air)
         else:
-            x1, v1 = integrate(field, method, n * h, x, v, h)
+            x1, v1, after = integrate(field, method, n * h, x, v, h, air)
         speed = max(length(v), length(v1))
         if not (speed < MAX_SPEED_M_S and np.isfinite(x1[0] + x1[1] + x1[2])):
             break
@@ -257,7 +265,7 @@ def _fly(
                 is_near |= length(add(x, -1.0, c)) < way
         if is_near:
             break
-        x, v, n = x1, v1, n + 1
+        x, v, air, n = x1, v1, after, n + 1
         fastest = max(fastest, speed)
         if n > 0 and n % substeps == 0:
             frame = n // substeps
@@ -268,6 +276,23 @@ def _fly(
     statistics[1] = fastest
     statistics[6] += kinetic * h * substeps
     return n, x, v
+
+
+@jit
+def _rest(
+    field: ForceField, grid: Grid, face: Vector, n: int, last: int, x: Vector, energies: Floats
+) -> int:  # fmt: skip
+    """Step from n on at which a particle at rest on a face begins to slide or leaves it, at most `last`."""
+    while n < last:
+        t = n * grid.step
+        a = acceleration(field, t, x, ORIGIN, air_velocity(field, t, x))
+        push = -dot(a, face)
+        if push < 0.0 or length(add(a, push, face)) > grid.friction * push:
+            break
+        n += 1
+        if n > 0 and n % grid.substeps == 0:
+            add_energy(energies, n // grid.substeps, field, n * grid.step, x, ORIGIN)
+    return n
 
 
 @jit

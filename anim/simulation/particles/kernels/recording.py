@@ -10,7 +10,7 @@ from anim.simulation.particles.kernels.vectors import Vector, dot
 from anim.skinning.kernels.jit import jit
 
 MAX_IMPACTS_PER_STEP = 12  # then the particle stays where it is until the next step
-MAX_KEYS_PER_STEP = 4 * MAX_IMPACTS_PER_STEP
+MAX_KEYS_PER_STEP = 4 * MAX_IMPACTS_PER_STEP + 8
 KEY_WIDTH = 10  # time, position, velocities before and after
 
 
@@ -38,5 +38,7 @@ def grow(keys: Floats, count: Ints) -> AnyArray:
     if count[0] + MAX_KEYS_PER_STEP <= len(keys):
         return keys
     larger = np.empty((2 * len(keys), KEY_WIDTH))
-    larger[: len(keys)] = keys
+    for row in range(count[0]):  # a slice would compile the words of its error, a second
+        for c in range(KEY_WIDTH):
+            larger[row, c] = keys[row, c]
     return larger

@@ -236,3 +236,15 @@ def test_the_written_clip_plays_the_paths_and_the_same_seed_gives_the_same_bytes
     track = next(each for each in new.tracks if each.path == "translation")
     np.testing.assert_allclose(sample(track, path.times), path.positions, atol=1e-6)
     assert new.end == 1.0
+
+
+def test_the_error_of_many_particles_is_estimated_from_some(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, scene, clip = biped()
+    options = ParticleOptions(Forces(linear_drag=2.0, wind=(3, 0, 0)), (Floor(0.0),), duration=1.0)
+    reports = []
+    for limit in (1000, 10):
+        monkeypatch.setattr("anim.simulation.particles.simulate.MAX_ESTIMATED", limit)
+        reports.append(simulate_particles(scene, clip, Emitter((3,), rate=60), options).report)
+    all_, some = (each.error_estimate_m or 0.0 for each in reports)
+    assert 0.1 * all_ < some <= all_
+    assert [each.figures["estimated_particles"] for each in reports] == [60, 10]
