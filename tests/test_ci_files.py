@@ -1,4 +1,4 @@
-"""The action's script runs under `bash -e`, and hooks name commands that exist."""
+"""The scripts of the action and of the CI examples run under `bash -e`, and hooks name commands that exist."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import shlex
 import subprocess
 import sys
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 from cli.main import COMMANDS
 from docs.pages import run
@@ -34,6 +37,50 @@ def test_the_action_annotates_sums_up_and_fails(fail_on: str, code: int, tmp_pat
     assert "::warning file=noop.glb,title=GA101 wide-steps::" in done.stdout
     assert "| noop.glb | warning | GA101 wide-steps |" in (tmp_path / "summary.md").read_text("utf-8")
     assert json.loads((tmp_path / "gltf-anim.sarif").read_text("utf-8"))["version"] == "2.1.0"
+
+
+def blocks(language: str) -> list[str]:
+    """The examples of a language on the page about CI."""
+    text = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def gitlab_script() -> list[str]:
+    (job,) = (example["animations"] for each in blocks("yaml") if "animations" in (example := yaml.safe_load(each)))
+    assert job["before_script"] == ["pip install gltf-anim"]
+    assert job["artifacts"] == {"when": "always", "reports": {"junit": "findings.xml"}}
+    return list(job["script"])
+
+
+def jenkins_script() -> list[str]:
+    (pipeline,) = blocks("groovy")
+    assert pipeline.count("{") == pipeline.count("}")
+    assert "always { junit 'findings.xml' }" in pipeline
+    install, *script = re.findall(r"sh '(.*)'", pipeline)
+    assert install == "pip install gltf-anim"
+    return script
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="bash and pip's scripts differ there")
+@pytest.mark.parametrize("script", [gitlab_script, jenkins_script])
+@pytest.mark.parametrize(("name", "code"), [("noop", 6), ("tube", 0)])
+def test_the_examples_write_a_report_also_if_they_fail(
+    script: Callable[[], list[str]], name: str, code: int, tmp_path: Path
+) -> None:
+    (tmp_path / "walk.glb").write_bytes(built(name))
+    done = run("set -e\n" + "\n".join(script()), tmp_path)
+    assert done.returncode == code, done.stdout
+    cases = ElementTree.parse(tmp_path / "findings.xml").iter("testcase")
+    assert [case.attrib["name"] for case in cases] == ["walk.glb"]
+
+
+def test_all_examples_and_files_are_yaml() -> None:
+    action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    github, _, hook = map(yaml.safe_load, blocks("yaml"))
+    inputs = next(step["with"] for step in github["steps"] if "gltf-anim" in step["uses"])
+    assert inputs.keys() <= action["inputs"].keys()
+    assert [each["id"] for each in hook["repos"][0]["hooks"]] == [each["id"] for each in hooks]
 
 
 def test_hooks_call_commands_of_the_table() -> None:

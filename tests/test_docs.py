@@ -13,7 +13,7 @@ RENEW = "docs/ is not current: run `make docs`"
 NUMBER = re.compile(r"[-+−]?\d+(\.\d+)?(e[-+]?\d+)?")  # in another version of numpy the last digit may differ
 LINK = re.compile(r"(?<!!)\[[^\]]+\]\(([^)#:]+)\)")
 MAX_PICTURES_BYTES = 1_500_000
-MAX_PAGE_LINES = 90
+MAX_PAGE_LINES = 120
 
 
 def test_the_reference_is_current(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,12 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+from lxml import etree
+
 from anim.check.baseline import FileFinding
 from anim.check.finding import Finding, Severity
 from anim.check.registry import RULES
 from cli.reports import check_report
 from tests.cli.conftest import Call
 from tests.cli.running import built
+from tests.files import glb_of, opened
+
+SCHEMAS = Path(__file__).parent / "schemas"  # junit-10.xsd: of Jenkins' xunit plugin, MIT license
 
 
 def test_github_shows_ten_of_a_severity_and_escapes_names(folder: Path, call: Call) -> None:
@@ -43,6 +49,19 @@ def test_junit_has_a_case_per_file(folder: Path, call: Call) -> None:
     assert cases["bad.glb"] == ["error"]
     assert cases["noop.glb"] == ["system-out"]
     assert root.attrib["tests"] == "3"
+
+
+@pytest.mark.parametrize("words", [(".",), ("crowd",), ("bad.glb", "noop.glb", "--select", "GA1")])
+def test_junit_agrees_with_the_schema_of_jenkins(words: tuple[str, ...], folder: Path, call: Call) -> None:
+    """Files that can't be read, that fail, with other findings only, and with none; names that XML must escape."""
+    (folder / "bad.glb").write_bytes(b"no glTF")
+    (folder / '<a> & "b" \u0007.glb').write_bytes(built("noop"))
+    spoilt = opened(built("arm"))
+    spoilt.json["materials"] = []
+    (folder / "crowd" / "wrong.glb").write_bytes(glb_of(spoilt))
+    (folder / "gltf-anim.toml").write_text('[[budget]]\nmatch = "crowd/*"\nclips = 0\n')
+    report = etree.fromstring(call("check", *words, "--format", "junit").out)
+    etree.XMLSchema(etree.parse(SCHEMAS / "junit-10.xsd")).assertValid(report)
 
 
 def test_markdown_is_a_table_that_names_cannot_break(folder: Path, call: Call) -> None:
