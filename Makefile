@@ -3,9 +3,10 @@ PYTHON ?= python3
 BPY_PYTHON ?= python3.11
 BIN := .venv/bin
 OUT := demo-out
+FUZZ_SECONDS ?= 14400
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test slow docs blender format clean
+.PHONY: demo test slow fuzz docs blender format clean
 
 demo: $(BIN)/.installed
 	@$(BIN)/python -m fixtures $(OUT)/fixtures 2>/dev/null
@@ -20,6 +21,10 @@ test: $(BIN)/.installed
 # What takes minutes: real files under three bounds, judged by three.js. CI runs it too.
 slow: $(BIN)/.installed
 	$(BIN)/python -m pytest -n auto -m slow
+
+# Mutations of fixtures for hours; inputs with faults go to fuzz-out (`python -m tests.fuzz --help`).
+fuzz: $(BIN)/.installed
+	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --seed $$(date +%s) --keep fuzz-out
 
 # The reference of commands, and the pages' pictures and output.
 docs: $(BIN)/.installed
@@ -45,4 +50,4 @@ $(BIN)/.installed: pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-blender $(OUT) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-blender $(OUT) fuzz-out .mypy_cache .pytest_cache .ruff_cache .hypothesis

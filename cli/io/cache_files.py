@@ -9,12 +9,14 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from anim.caches import registry
 from anim.caches.formats import mesh_sequence
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.storage import suffix
-from anim.errors import AnimError, FormatError, OutputError, not_written
+from anim.errors import AnimError, DataRangeError, FormatError, OutputError, not_written
 from anim.files import resolver
 from anim.model import VertexCache
 from cli import text
@@ -66,6 +68,8 @@ def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
             yield LoadedCache(cache, name, ending, tuple(notes), inputs)
         except (UsageError, OutputError):
             raise
+        except (np.linalg.LinAlgError, OverflowError) as error:
+            raise DataRangeError(f"has values too large to compute with ({str(error).lower()})", where=name) from None
         except AnimError as error:
             raise error.at(name, ": ") from None
 

@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from anim.errors import AnimError, FormatError, OutputError
+from anim.errors import AnimError, DataRangeError, FormatError, OutputError
 from anim.files import resolver
 from anim.gltf.document import Bytes, Document, json_array, node_label
 from anim.gltf.io import container, uri
@@ -53,6 +53,8 @@ def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read
         yield found
     except (UsageError, OutputError):
         raise
+    except (np.linalg.LinAlgError, OverflowError) as error:
+        raise DataRangeError(f"has values too large to compute with ({str(error).lower()})", where=name) from None
     except AnimError as error:
         raise error.at(name, ": ") from None
 

@@ -41,7 +41,8 @@ class Outcome:
     problems: list[str] = field(default_factory=list)
 
 
-Look = Callable[[int, Sequence[str], bytes], list[str]]  # exit code, new files, stdout → problems of the outputs
+# Command line, exit code, new files, stdout → problems of the outputs.
+Look = Callable[[Sequence[str], int, Sequence[str], bytes], list[str]]
 
 
 def run_jobs(jobs: Sequence[Job], look: Look = lambda *_: []) -> Iterator[Outcome]:
@@ -103,7 +104,7 @@ def _one(job: Job, folder: Path, look: Look) -> Outcome:
     new = sorted(path.name for path in folder.iterdir() if path.name not in job.files)
     buffer = out.buffer
     assert isinstance(buffer, io.BytesIO)
-    return Outcome(code, err.getvalue(), seconds, peak, look(code, new, buffer.getvalue()))
+    return Outcome(code, err.getvalue(), seconds, peak, look(job.line, code, new, buffer.getvalue()))
 
 
 def _limit() -> None:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from anim.arrays import Floats, Ints, unique_sorted
-from anim.errors import RangeError
+from anim.errors import DataRangeError
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track
 from anim.sampling.times import distinct_float32, just_before
@@ -131,7 +131,7 @@ def refine(times: Floats, count: SegmentCount) -> Floats:
         counts = count(a, b)
         again = counts > 1
         if counts[again].sum() + sum(map(len, found)) > MAX_KEYS:
-            raise RangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
+            raise DataRangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
         a, b = split_segments(a[again], b[again], counts[again])
         found.append(a)
     return unique_sorted(np.concatenate(found))
@@ -195,7 +195,7 @@ def _split_by_travel(motion: TrackFunction, knots: Floats) -> Floats:
         return knots
     counts = np.maximum(np.ceil(motion.travel(knots[:-1], knots[1:]) / MAX_TRAVEL_RAD), 1)
     if counts.sum() > MAX_KEYS:
-        raise RangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")
+        raise DataRangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")
     return np.append(split_segments(knots[:-1], knots[1:], counts.astype(np.int64))[0], knots[-1])
 
 

@@ -46,6 +46,8 @@ def validate(json: Json) -> None:
     if "asset" not in json:
         raise FormatError("has no 'asset' (every glTF names its version there)")
     check_property("asset", checks.pop("asset"), json["asset"])
+    if "scene" in json:
+        check_property("scene", _index("scenes", counts), json["scene"])
     for key in ("extensionsUsed", "extensionsRequired"):
         check_property(key, list_of(text), json.get(key, []))
     for key, check_one in checks.items():

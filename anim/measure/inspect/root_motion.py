@@ -67,7 +67,12 @@ def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
         return frozenset(above)
     scenes = json.get("scenes", ())
     tops = scenes[json.get("scene", 0)].get("nodes", ()) if scenes else ()
-    found = {node for top in tops for node in np.flatnonzero(skeleton.descendants(top)).tolist()}
+    found, waiting = set(tops), list(tops)
+    nodes = json.get("nodes", ())
+    while waiting:
+        below = [child for child in nodes[waiting.pop()].get("children", ()) if child not in found]
+        found.update(below)
+        waiting += below
     return frozenset(found or range(len(skeleton)))
 
 

@@ -1,0 +1,124 @@
+"""python -m tests.fuzz [gltf] [euler] [cache] [--count N] [--seed S] [--seconds T] [--keep FOLDER]: fuzz the commands.
+
+Runs mutations of fixtures until N of each family are done, or T seconds have passed; prints each new kind of fault,
+and keeps its input in FOLDER, as one JSON file. Such a file in tests/fuzz/found is a test from then on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import itertools
+import json
+import re
+import sys
+import time
+import warnings
+from collections import Counter
+from pathlib import Path
+
+from tests.fuzz.execution import BATCH, Job, Outcome, run_jobs
+from tests.fuzz.families import jobs, look, problems, sound_jobs
+
+FAMILIES = ("gltf", "euler", "cache")
+
+
+def main() -> int:
+    """Run the fuzzers of the command line; return 1 if there was a fault."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description="Fuzz the commands.")
+    parser.add_argument("families", nargs="*", default=[])
+    parser.add_argument("--count", type=int, default=10**9)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=3600)
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--replay", type=Path)
+    given = parser.parse_args()
+    faults: Counter[str] = Counter()
+    done: Counter[str] = Counter()
+    if given.replay:
+        return replay(given.replay)
+    families = given.families or list(FAMILIES)
+    for family in families:
+        warm(family)
+    end = time.monotonic() + given.seconds
+    for first in itertools.count(given.first, BATCH):
+        if time.monotonic() > end or first >= given.first + given.count:
+            break
+        for family in families:
+            run_batch(family, given.seed, first, faults, done, given.keep)
+    print(f"{dict(done)} runs, {sum(faults.values())} faults of {len(faults)} kinds")  # noqa: T201
+    return int(bool(faults))
+
+
+def warm(family: str) -> None:
+    """Run each command line once in this process, so that its copies have all modules and kernels."""
+    import contextlib
+    import io
+    import os
+    import tempfile
+
+    from cli import main as command
+
+    warnings.simplefilter("ignore")
+    here = Path.cwd()
+    for job in sound_jobs(family):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, data in job.files.items():
+                (Path(folder) / name).write_bytes(data)
+            os.chdir(folder)
+            with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.TextIOWrapper(io.BytesIO())):
+                command.run(list(job.line))
+            os.chdir(here)
+
+
+def run_batch(family: str, seed: int, first: int, faults: Counter[str], done: Counter[str], keep: Path | None) -> None:
+    """Run a batch and count its faults by kind."""
+    batch = jobs(family, seed, range(first, first + BATCH))
+    for number, (job, outcome) in enumerate(zip(batch, run_jobs(batch, look), strict=True), first):
+        done[family] += 1
+        found = problems(outcome)
+        if found:
+            kind = kind_of(job, outcome, found)
+            faults[kind] += 1
+            if faults[kind] == 1:
+                print(f"{family} {seed} {number}: {' '.join(job.line)}: {kind}", flush=True)  # noqa: T201
+                if keep is not None:
+                    save(job, keep / f"{family}-{seed}-{number}.json")
+
+
+def kind_of(job: Job, outcome: Outcome, found: list[str]) -> str:
+    """Return what faults of one cause have in common: where a traceback ended, else the words without numbers."""
+    places = re.findall(r'File ".*?/((?:anim|cli)/.*?)", line (\d+)', outcome.err)
+    if places and "Traceback" in found:
+        last = [each for each in outcome.err.splitlines() if re.match(r"\w[\w.]*(Error|Exception|Warning)", each)]
+        return f"{':'.join(places[-1])} {last[-1][:100] if last else ''}"
+    return f"{job.line[0]}: " + re.sub(r"\d+(\.\d+)?", "N", f"{'; '.join(found)}: {outcome.err[:150]}")
+
+
+def replay(folder: Path) -> int:
+    """Run the jobs that were kept in a folder; return 1 if there is a fault."""
+    kept = [load(path) for path in sorted(folder.glob("*.json"))]
+    faults = 0
+    for job, outcome in zip(kept, run_jobs(kept, look), strict=True):
+        if found := problems(outcome):
+            faults += 1
+            print(f"{' '.join(job.line)}: {kind_of(job, outcome, found)}")  # noqa: T201
+    return int(faults > 0)
+
+
+def save(job: Job, path: Path) -> None:
+    """Write a job as JSON."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    files = {name: base64.b64encode(data).decode() for name, data in job.files.items()}
+    path.write_text(json.dumps({"line": list(job.line), "files": files}) + "\n")
+
+
+def load(path: Path) -> Job:
+    """Read a job from JSON."""
+    content = json.loads(path.read_text())
+    return Job(content["line"], {name: base64.b64decode(data) for name, data in content["files"].items()})
+
+
+if __name__ == "__main__":
+    sys.exit(main())
