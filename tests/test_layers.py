@@ -39,6 +39,7 @@ TERMINAL = {"typer", "click", "rich", "argparse"}
 OPENING = {  # modules of the library that may open a path
     "anim/asset.py",
     "anim/caches/cache_file.py",
+    "anim/caches/formats/usd_package.py",  # its library takes names only
     "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/files/atomic.py",
     "anim/files/resolver.py",

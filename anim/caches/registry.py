@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.caches.formats import gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.signatures import Signature, is_mdd, is_obj, is_stl, starts_with
+from anim.caches.signatures import Signature, is_mdd, is_npz, is_obj, is_stl, is_usdz, starts_with
 from anim.caches.storage import Inputs, Outputs
 from anim.caches.vat import reader, writer
 from anim.errors import AnimError, FormatError, RangeError, ShapeError, UnsupportedError
@@ -61,9 +61,9 @@ def _frames(ending: str, about: str, begins: Signature, *, holds: frozenset[str]
     return CacheFormat(about, read, write, begins, RATE, holds, Files.FRAMES)
 
 
-def _usd(ending: str, about: str, magic: bytes) -> CacheFormat:
-    write = partial(usd_writer.write, ending=ending)
-    return CacheFormat(about, usd_reader.read, write, starts_with(magic), RATE, BOTH)
+def _usd(ending: str, about: str, begins: Signature) -> CacheFormat:
+    read = partial(usd_reader.read, ending=".usdz" if ending == ".usdz" else ".usd")
+    return CacheFormat(about, read, partial(usd_writer.write, ending=ending), begins, RATE | {"source"}, BOTH)
 
 
 def _texture(ending: str, about: str, magic: bytes, *takes: str) -> CacheFormat:
@@ -72,7 +72,7 @@ def _texture(ending: str, about: str, magic: bytes, *takes: str) -> CacheFormat:
 
 
 CACHE_FORMATS: dict[str, CacheFormat] = {
-    ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write, starts_with(b"PK"), holds=BOTH),
+    ".npz": CacheFormat("numpy arrays, lossless: the hub", npz.read, npz.write, is_npz, holds=BOTH),
     ".pc2": CacheFormat(
         "point cache of 3ds Max and Blender",
         pc2.read,
@@ -81,8 +81,9 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         frozenset(("input_fps", "rest_mesh")),
     ),
     ".mdd": CacheFormat("point cache of LightWave and Blender", mdd.read, mdd.write, is_mdd, frozenset(("rest_mesh",))),
-    ".usdc": _usd(".usdc", "USD, binary (extra usd)", b"PXR-USDC"),
-    ".usda": _usd(".usda", "USD, text (extra usd)", b"#usda"),
+    ".usdc": _usd(".usdc", "USD, binary (extra usd)", starts_with(b"PXR-USDC")),
+    ".usda": _usd(".usda", "USD, text (extra usd)", starts_with(b"#usda")),
+    ".usdz": _usd(".usdz", "USD with its images, a package (extra usd)", is_usdz),
     ".glb": CacheFormat(
         "glTF: morph targets or a flip-book",
         gltf.read,

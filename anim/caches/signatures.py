@@ -16,6 +16,17 @@ def starts_with(magic: bytes) -> Signature:
     return lambda head, _: head.startswith(magic)
 
 
+def is_usdz(head: bytes, size: int) -> bool:
+    """Return whether a file is an archive whose first file is a USD stage."""
+    name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
+    return head.startswith(b"PK") and name.endswith((b".usd", b".usda", b".usdc"))
+
+
+def is_npz(head: bytes, size: int) -> bool:
+    """Return whether a file is any other archive."""
+    return head.startswith(b"PK") and not is_usdz(head, size)
+
+
 def is_mdd(head: bytes, size: int) -> bool:
     """Return whether a file is MDD: it has no magic bytes, but its size follows from its header."""
     if len(head) < 8:

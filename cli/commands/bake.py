@@ -27,7 +27,7 @@ from cli.progress import Progress, announce_compiling
 from cli.reports import bake_notes
 from cli.reports.bake_report import BakedFile, report_notes, report_written, summarize_files
 from cli.text import Reporter
-from cli.workflows.bake_clip import BakeOptions, default_directions, keeps_materials, source_options
+from cli.workflows.bake_clip import BakeOptions, default_directions, keeps_materials, keeps_nodes, source_options
 from cli.workflows.bake_jobs import PLACEHOLDERS, bake_jobs, mesh_groups
 
 LBS = Method("lbs")
@@ -106,6 +106,7 @@ def command(
     A .glb is the source file with other vertices: its materials, images, texture coordinates, colors, extras and
     extensions stay, and so do unskinned meshes, cameras and lights with their channels. Skins and the channels of
     joints are left out, or stay with --keep-skeleton; so are meshes that --mesh does not select, and other clips.
+    USD has the materials as UsdPreviewSurface; their images are in a .usdz, and beside a .usdc or .usda.
     """
     voice = Reporter(quiet, verbose)
     began = time.perf_counter()
@@ -123,7 +124,7 @@ def command(
     # Raises before any work for options that the format doesn't support.
     caches.write_options(ending, given | {"max_error": max_error})
     caches.check_supported(ending, normals=bool(normals), tangents=bool(tangents))
-    if keep_skeleton and not keeps_materials(ending):
+    if keep_skeleton and not keeps_nodes(ending):
         raise UsageError(f"--keep-skeleton does not apply to {ending}")
     done: list[BakedFile] = []
     with documents.source(input, voice) as source:
@@ -148,7 +149,7 @@ def command(
         normals = lit if normals is None else normals
         options = BakeOptions(method.value, blend, bulge_clamp, space.value, normals, tangents, rigid, fps, start, end)
         announce_compiling(voice)
-        if not rigid and not keeps_materials(ending) and bakeable_instances(scene, nodes=nodes):
+        if not rigid and not keeps_nodes(ending) and bakeable_instances(scene, nodes=nodes):
             bake_notes.left_out_note(scene, nodes, voice)
         missed: list[tuple[str, InbetweenError]] = []
         made: dict[int, Baker] = {}

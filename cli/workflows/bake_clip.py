@@ -92,6 +92,11 @@ def keeps_materials(ending: str) -> bool:
     return "source" in CACHE_FORMATS[ending].takes
 
 
+def keeps_nodes(ending: str) -> bool:
+    """Return whether a format keeps nodes, and so meshes that are not baked."""
+    return "layout" in CACHE_FORMATS[ending].takes
+
+
 def source_options(
     source: Source,
     ending: str,

@@ -20,20 +20,20 @@ from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
 
 
-def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
+def read(inputs: Inputs, reading: ReadOptions, *, ending: str = ".usd") -> VertexCache:
     """Return all meshes of the stage in one cache, in metres, at every time code of any points.
 
     Meshes are transformed to world space and concatenated in the order of the stage; polygons become triangles.
-    Raises UnsupportedError without usd-core, FormatError for a stage without meshes.
+    ending: ".usdz" for a package. Raises UnsupportedError without usd-core, FormatError for a stage without meshes.
     """
-    with _opened(inputs) as stage:
+    with _opened(inputs, ending) as stage:
         codes, rate, faces, still = stage.codes(), reading.fps or stage.rate, stage.faces(), stage.positions(None)
     parts = parts_of(stage.kept)
     return VertexCache(
         codes / rate - min(codes[0] / rate, 0.0),
         stage.vertices,
         faces,
-        lambda: _chunks(inputs, codes, stage.vertices, stage.has_normals, stage.handedness is not None),
+        lambda: _chunks(inputs, ending, codes, stage.vertices, stage.has_normals, stage.handedness is not None),
         rest=None if still is None else still * stage.unit,
         has_normals=stage.has_normals,
         parts=parts if parts and parts[-1].vertices[1] == stage.vertices else (),
@@ -43,12 +43,12 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 @contextmanager
-def _opened(inputs: Inputs) -> Iterator[_Stage]:
+def _opened(inputs: Inputs, ending: str) -> Iterator[_Stage]:
     """Yield the stage in the main file; any error of usd-core becomes a FormatError."""
     usd_writer.package()
     from pxr import Tf
 
-    with temporary_files.temp_input(inputs, inputs.main, ".usd") as path:
+    with temporary_files.temp_input(inputs, inputs.main, ending) as path:
         try:
             with temporary_files.silence_native():
                 stage = _Stage(path)
@@ -187,9 +187,11 @@ def _fans(counts: Ints, corners: Ints) -> Ints:
     return chosen
 
 
-def _chunks(inputs: Inputs, codes: Floats, vertices: int, normals: bool, tangents: bool) -> Iterator[FrameChunk]:
+def _chunks(
+    inputs: Inputs, ending: str, codes: Floats, vertices: int, normals: bool, tangents: bool
+) -> Iterator[FrameChunk]:
     step = frame_blocks.per_chunk(vertices)
-    with _opened(inputs) as stage:
+    with _opened(inputs, ending) as stage:
         for first in range(0, len(codes), step):
             some = codes[first : first + step].tolist()
             with temporary_files.silence_native():
