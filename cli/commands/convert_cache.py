@@ -80,7 +80,7 @@ def command(
     file, in world space. If it has several clips, --clip selects that of IN, whose channels of other nodes then stay.
 
     Textures (.exr, .png) get a companion JSON file and mesh. A pipe carries one file: no textures, and only one frame
-    of a sequence.
+    of a sequence. Meshes of a USD may move by points, transforms, skeletons and blend shapes.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()

@@ -12,7 +12,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks, temporary_files
-from anim.caches.formats import usd_writer
+from anim.caches.formats import usd_motion, usd_writer
 from anim.caches.formats.npz import parts_of
 from anim.caches.options import ReadOptions
 from anim.caches.storage import Inputs
@@ -21,10 +21,11 @@ from anim.model import FrameChunk, VertexCache
 
 
 def read(inputs: Inputs, reading: ReadOptions, *, ending: str = ".usd") -> VertexCache:
-    """Return all meshes of the stage in one cache, in metres, at every time code of any points.
+    """Return all meshes of the stage in one cache, in metres, at every time code at which any of them moves.
 
-    Meshes are transformed to world space and concatenated in the order of the stage; polygons become triangles.
-    ending: ".usdz" for a package. Raises UnsupportedError without usd-core, FormatError for a stage without meshes.
+    Meshes are skinned, transformed to world space and concatenated in the order of the stage; polygons become
+    triangles. ending: ".usdz" for a package. Raises UnsupportedError without usd-core and for a PointInstancer,
+    FormatError without meshes.
     """
     with _opened(inputs, ending) as stage:
         codes, rate, faces, still = stage.codes(), reading.fps or stage.rate, stage.faces(), stage.positions(None)
@@ -63,8 +64,8 @@ class _Stage:
     def __init__(self, path: str) -> None:
         stages, geom, _ = usd_writer.package()
         self._stage = stages.Stage.Open(_single_layer(path))
-        self._geom, self._default = geom, stages.TimeCode.Default()
-        self._meshes = [geom.Mesh(prim) for prim in self._stage.Traverse() if prim.IsA(geom.Mesh)]
+        self._geom, self._default, self._earliest = geom, stages.TimeCode.Default(), stages.TimeCode.EarliestTime()
+        self._meshes = usd_motion.meshes(self._stage)
         counts = [len(self._points(mesh)) for mesh in self._meshes]
         self._ends = np.cumsum([0, *counts])
         self.vertices = int(self._ends[-1])
@@ -83,9 +84,8 @@ class _Stage:
             self.kept = {}
 
     def codes(self) -> Floats:
-        """Time codes with points of any mesh; 0 for a static stage."""
-        found = {code for mesh in self._meshes for code in mesh.GetPointsAttr().GetTimeSamples()}
-        return np.array(sorted(found) or [0.0])
+        """Time codes at which any mesh moves; 0 for a static stage."""
+        return usd_motion.time_codes(self._meshes, self.rate)
 
     def faces(self) -> Ints:
         """Triangles (T, 3) of all meshes."""
@@ -106,7 +106,7 @@ class _Stage:
             points = np.asarray(mesh.GetPointsAttr().Get(self._default if code is None else code) or (), np.float64)
             if not len(points) and code is None:
                 return None
-            matrix = np.array(mesh.ComputeLocalToWorldTransform(self._default if code is None else code))
+            matrix = np.array(mesh.ComputeLocalToWorldTransform(self._earliest if code is None else code))
             rows.append(points.reshape(-1, 3) @ matrix[:3, :3] + matrix[3, :3])
         return np.concatenate(rows)
 

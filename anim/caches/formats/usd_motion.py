@@ -1,0 +1,76 @@
+"""Motion of a USD stage besides points: skeletons, blend shapes, instances and animated transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.errors import FormatError, UnsupportedError
+
+MIN_FPS = 24.0  # frames per second of animated transforms: a rotation is not linear between its samples
+MAX_FRAMES = 1_000_000  # of animated transforms
+
+
+def meshes(stage: Any) -> list[Any]:
+    """Meshes of the stage, with skinning and blend shapes as time samples of their points.
+
+    The file stays unchanged: the edits are in the session layer. Raises UnsupportedError for a PointInstancer,
+    FormatError for a skeleton that usd-core can't evaluate.
+    """
+    from pxr import UsdGeom
+
+    stage.SetEditTarget(stage.GetSessionLayer())
+    _separate_instances(stage)
+    _bake_skeletons(stage)
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.PointInstancer):
+            raise UnsupportedError(
+                f"{prim.GetPath()} is a PointInstancer, whose copies are not read",
+                help="make its copies real meshes where the file is written",
+            )
+    return [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+
+
+def time_codes(meshes: Sequence[Any], codes_per_second: float) -> Floats:
+    """Time codes (F,) of all points, and of animated transforms with at least 24 frames per second; 0 without any."""
+    found = {code for mesh in meshes for code in mesh.GetPointsAttr().GetTimeSamples()}
+    moved = {code for mesh in meshes for code in _transform_codes(mesh.GetPrim())}
+    if moved:
+        step = min(1.0, codes_per_second / MIN_FPS)
+        if max(moved) - min(moved) > MAX_FRAMES * step:
+            raise FormatError(f"has transforms animated from time code {min(moved):g} to {max(moved):g}")
+        found |= moved | set(np.arange(min(moved), max(moved), step).tolist())
+    return np.array(sorted(found) or [0.0])
+
+
+def _separate_instances(stage: Any) -> None:
+    """Give every instance its own prims: a traversal leaves out those of shared prototypes."""
+    while instances := [prim for prim in stage.Traverse() if prim.IsInstance()]:
+        for prim in instances:
+            prim.SetInstanceable(False)
+
+
+def _bake_skeletons(stage: Any) -> None:
+    from pxr import UsdSkel
+
+    for prim in [prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Root)]:
+        if not UsdSkel.BakeSkinning(UsdSkel.Root(prim)):
+            raise FormatError(f"{prim.GetPath()}: its skeleton can't be evaluated")
+
+
+def _transform_codes(prim: Any) -> Iterator[float]:
+    """Time samples of the animated transforms of a prim and those above it."""
+    from pxr import UsdGeom
+
+    while prim:
+        transform = UsdGeom.Xformable(prim)
+        if transform:
+            for operation in transform.GetOrderedXformOps():
+                samples = operation.GetTimeSamples()
+                yield from samples if len(samples) > 1 else ()
+            if transform.GetResetXformStack():
+                return
+        prim = prim.GetParent()
