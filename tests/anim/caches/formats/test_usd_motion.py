@@ -49,7 +49,8 @@ def stage(content: str, *, primvars: str = "", codes_per_second: float = 24) -> 
     mesh = TRIANGLE.replace("PRIMVARS", primvars)
     if primvars:
         mesh = mesh.replace('"mesh"', '"mesh" (prepend apiSchemas = ["SkelBindingAPI"])')
-    text = f"#usda 1.0\n( metersPerUnit = 1\n timeCodesPerSecond = {codes_per_second} )\n{content.replace('CHILD', mesh)}\n"
+    head = f"( metersPerUnit = 1\n timeCodesPerSecond = {codes_per_second} )"
+    text = f"#usda 1.0\n{head}\n{content.replace('CHILD', mesh)}\n"
     return opened(Memory("a.usda", {"a.usda": text.encode()}))
 
 
