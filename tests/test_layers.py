@@ -92,7 +92,7 @@ PUBLIC = {
         "stability_plot tangent_plot track_plot track_selection"
     ),
     "simulation.cloth": "colliders model options selection simulate solver",
-    "simulation.particles": "attractors emission forces obstacles options simulate solver",
+    "simulation.particles": "attractors emission forces obstacles options rigid_colliders simulate solver",
     "simulation.rigid_bodies": "description node_globs options simulate",
     "simulation.spring_bones": "chain_globs chains colliders json_reader penetration read reduction report simulate",
     "skinning.analysis": (

@@ -56,6 +56,34 @@ Spheres = Annotated[
     list[str] | None,
     typer.Option("--sphere", metavar="AT,R", help="A ball at X,Y,Z or at a node, and its radius; may be repeated."),
 ]
+Capsules = Annotated[
+    list[str] | None,
+    typer.Option("--capsule", metavar="A,B,R", help="A capsule from node A to node B; may be repeated."),
+]
+Planes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plane",
+        metavar="AT,N",
+        help="A plane at X,Y,Z or at a node, and its normal NX,NY,NZ (a node's y axis without); may be repeated.",
+    ),
+]
+Colliders = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--colliders",
+        metavar="vrm|FILE",
+        help="Colliders of the file's own VRM spring bones, or of a JSON file as of simulate springs.",
+    ),
+]
+ParticleColliders = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--colliders",
+        metavar="vrm|khr|FILE",
+        help="Colliders of the file's VRM spring bones, of its rigid bodies, or of a JSON file as of simulate springs.",
+    ),
+]
 FloorHeight = Annotated[float | None, typer.Option("--floor", metavar="Y", help="Height in metres of a floor.")]
 Friction = Annotated[float, typer.Option("--friction", metavar="N", help="Coulomb's friction.", min=0)]
 Restitution = Annotated[

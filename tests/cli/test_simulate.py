@@ -69,7 +69,7 @@ def test_options_of_several_kinds_are_written_once() -> None:
 def test_the_help_of_particles_states_its_limits(call: Call) -> None:
     words = " ".join(call("simulate", "particles", "--help").product().decode().split())
     assert "with verlet, velocity-verlet or rk4 only, a path is written as the exact parabolas" in words
-    assert "--floor, --sphere and --box stop the centers of particles" in words
+    assert "Balls, boxes, capsules and planes stop the centers of particles" in words
 
 
 def test_an_unknown_kind_is_named_with_the_nearest(call: Call) -> None:

@@ -1,4 +1,4 @@
-"""`gltf-anim simulate particles` as a user runs it: forms, points, reports, loops, obstacles on nodes."""
+"""`gltf-anim simulate particles` as a user runs it: forms, points, reports, loops, obstacles."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 
 import anim
 from anim.sampling.track import sample
+from tests.anim.simulation.rigid_bodies.cases import collider, document, node
 from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Player
 from tests.judge import judge, needs_judge, vertices
@@ -256,3 +257,35 @@ def test_no_emitter_is_refused(fixture: Fixture, call: Call, tmp_path: Path) -> 
     run = call("simulate", "particles", fixture("biped"), tmp_path / "out.glb")
     assert run.code == 2
     assert "--node" in run.err
+
+
+def test_colliders_of_the_file_of_rigid_bodies_and_of_options_stop_particles(
+    fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    colliders = tmp_path / "colliders.json"
+    ball = {"node": "head", "sphere": {"radius": 0.3}}
+    colliders.write_text(json.dumps({"schema": "spring-bones/1", "colliders": [ball]}))
+    made = document(
+        [
+            node((0, 2, 0)),
+            node((0, 0.5, 0), collider=collider(0)),
+            node(collider=collider(1)),
+            node((9, 0, 0), collider=collider(2)),
+        ],
+        [{"type": "box", "box": {"size": [4, 1, 4]}}, {"type": "plane"}, {"type": "cylinder"}],
+    )
+    own = tmp_path / "bodies.gltf"
+    own.write_text(json.dumps(made.json))
+    common = ("--rate", "30", "--speed", "1", "--duration", "1.5")
+    for source, options in (
+        (fixture("biped"), ("--colliders", colliders, "--node", "head")),
+        (fixture("ponytail"), ("--colliders", "vrm", "--node", "*")),
+        (fixture("biped"), ("--capsule", "hips,head,0.3", "--node", "head")),
+        (fixture("biped"), ("--plane", "0,0,0,0,1,0.2", "--node", "head")),
+        (own, ("--colliders", "khr", "--node", "0")),
+    ):
+        report = tmp_path / "report.json"
+        words = simulate(call, source, tmp_path / "out.glb", *common, *options, "--report", report)
+        found = json.loads(report.read_text())
+        assert found["impacts"] + found["born_inside"] > 0, options
+        assert ("is no sphere, box, capsule or plane" in words) == ("khr" in options)

@@ -12,6 +12,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.simulation.particles.attractors import Attractor
+from anim.simulation.particles.node_motion import split_frames
 from anim.simulation.particles.obstacles import Drive
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def pack_forces(
     centers = np.array([[each.center for each in attractors]], np.float64).reshape(1, -1, 3)
     nodes = [k for k, each in enumerate(attractors) if each.node is not None]
     if nodes and drive is not None:
-        positions, rotations = drive([each.node for each in attractors if each.node is not None])
+        positions, rotations = split_frames(drive([each.node for each in attractors if each.node is not None]))
         centers = np.repeat(centers, len(positions), axis=0)
         centers[:, nodes] = positions + quaternion.rotate(rotations, centers[:, nodes])
     x, y, z = (float(value) for value in forces.gravity)

@@ -1,4 +1,4 @@
-"""Positions and rotations of nodes at every step of a simulation, from the driving clip."""
+"""Matrices of nodes at every step of a simulation, from the driving clip."""
 
 from __future__ import annotations
 
@@ -22,16 +22,21 @@ class NodeMotion:
         self._skeleton, self._sampler = skeleton, PoseSampler(skeleton, clip)
         self._start, self._period = start, period
 
-    def at(self, times: Floats, nodes: Sequence[int]) -> tuple[Floats, Floats]:
-        """Return positions (S, n, 3) m and rotations (S, n, 4), sign-continuous, at times (S,) s."""
-        positions = np.empty((len(times), len(nodes), 3))
-        rotations = np.empty((len(times), len(nodes), 4))
+    def at(self, times: Floats, nodes: Sequence[int]) -> Floats:
+        """Return the world matrices (S, n, 3, 4) at times (S,) s."""
+        matrices = np.empty((len(times), len(nodes), 3, 4))
         wrapped = np.maximum(times, 0.0) if self._period is None else _wrap(times, self._period)
         for first in range(0, len(times), CHUNK_STEPS):
             chunk = slice(first, first + CHUNK_STEPS)
-            world = world_matrices(self._skeleton, self._sampler.at(self._start + wrapped[chunk]))[:, list(nodes)]
-            positions[chunk], rotations[chunk], _, _ = matrix.decompose(world)
-        return positions, quaternion.align_signs(rotations)
+            poses = self._sampler.at(self._start + wrapped[chunk])
+            matrices[chunk] = world_matrices(self._skeleton, poses)[:, list(nodes)]
+        return matrices
+
+
+def split_frames(matrices: Floats) -> tuple[Floats, Floats]:
+    """Return positions (S, n, 3) m and rotations (S, n, 4), sign-continuous, of matrices (S, n, 3, 4)."""
+    positions, rotations, _, _ = matrix.decompose(matrices)
+    return positions, quaternion.align_signs(rotations)
 
 
 def _wrap(times: Floats, period: float) -> Floats:

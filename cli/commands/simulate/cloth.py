@@ -33,7 +33,7 @@ from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
 from cli.text import Reporter
 from cli.workflows.bake_clip import keeps_materials, onto_source
-from cli.workflows.cloth_colliders import parse_colliders
+from cli.workflows.colliders import parse_colliders
 from cli.workflows.simulate_clip import NO_CLIP, driving_clip
 from cli.workflows.simulation_report import check_report, write_report
 
@@ -70,26 +70,9 @@ def command(
     ] = 0.3,
     floor: simulation.FloorHeight = None,
     sphere: simulation.Spheres = None,
-    capsule: Annotated[
-        list[str] | None,
-        typer.Option("--capsule", metavar="A,B,R", help="A capsule from node A to node B; may be repeated."),
-    ] = None,
-    plane: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--plane",
-            metavar="AT,N",
-            help="A plane at X,Y,Z or at a node, and its normal NX,NY,NZ (a node's y axis without); may be repeated.",
-        ),
-    ] = None,
-    colliders: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--colliders",
-            metavar="vrm|FILE",
-            help="Colliders of the file's own VRM spring bones, or of a JSON file as of simulate springs.",
-        ),
-    ] = None,
+    capsule: simulation.Capsules = None,
+    plane: simulation.Planes = None,
+    colliders: simulation.Colliders = None,
     thickness: Annotated[
         str, typer.Option("--thickness", metavar="LENGTH", help="Distance that is kept from colliders.")
     ] = "5mm",

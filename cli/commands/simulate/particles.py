@@ -7,7 +7,6 @@ from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from anim.caches.points import POINT_FORMATS, encode_points
@@ -16,26 +15,27 @@ from anim.gltf.document import Document
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
-from anim.simulation.particles.attractors import Attractor
 from anim.simulation.particles.emission import Emitter
 from anim.simulation.particles.forces import Forces
-from anim.simulation.particles.obstacles import Box, Floor, Obstacle, Sphere
+from anim.simulation.particles.obstacles import Floor, Obstacle
 from anim.simulation.particles.options import SPARK_KG, ParticleOptions
+from anim.simulation.particles.rigid_colliders import read_rigid_colliders
 from anim.simulation.particles.simulate import ParticleRun, add_particles, simulate_particles
 from anim.simulation.particles.solver import Contact
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.units import is_zero_angle
 from cli import text, units
-from cli.errors import UsageError
 from cli.options import common, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
 from cli.text import Reporter
+from cli.workflows.colliders import parse_colliders
+from cli.workflows.particle_options import parse_attractor, parse_box
 from cli.workflows.simulate_clip import simulate_clip
 
 ROUNDING_M = 1e-9
-ATTRACTOR_RADIUS = "10%"
+RIGID_BODIES = "khr"  # a value of --colliders
 MANY_DRAWS = 1000  # nodes, from which one skinned mesh is the better file
 MANY_NODES, MAX_NODES = 2000, 10_000  # players take a second to bind the tracks of some 2 500; then ever more
 
@@ -126,6 +126,9 @@ def command(
         list[str] | None,
         typer.Option("--box", metavar="AT,SX,SY,SZ", help="A box at X,Y,Z or on a node, and its sizes; repeatable."),
     ] = None,
+    capsule: simulation.Capsules = None,
+    plane: simulation.Planes = None,
+    colliders: simulation.ParticleColliders = None,
     restitution: simulation.Restitution = 0.5,
     friction: simulation.Friction = 0.3,
     integrator: simulation.IntegratorOption = simulation.VELOCITY_VERLET,
@@ -152,9 +155,9 @@ def command(
     .usda hold points with ids instead. Without drag, turbulence and attractors, and with
     verlet, velocity-verlet or rk4 only, a path is written as the exact parabolas between impacts; else it has a key per
     frame, of which --max-error removes some. The time of an impact is found inside the step. Wind and turbulence need
-    drag. Obstacles and attractors on nodes follow the clip in every step. --floor, --sphere and --box stop the centers
-    of particles, not their surfaces. --loop begins with the particles that are alive at the end, so that the clip
-    repeats without a seam.
+    drag. Obstacles and attractors on nodes follow the clip in every step. Balls, boxes, capsules and planes stop the
+    centers of particles, not their surfaces; meshes are no obstacles. --loop begins with the particles that are alive
+    at the end, so that the clip repeats without a seam.
     """
     simulation.check_fps(fps)
     options = ParticleOptions(
@@ -205,8 +208,20 @@ def command(
             duration=seconds,
             size=radius,
             start=driver.start,
-            obstacles=_obstacles(floor, sphere or [], box or [], scene),
-            attractors=tuple(_attractor(each, scene) for each in attractor or ()),
+            obstacles=(
+                *([] if floor is None else [Floor(floor)]),
+                *(parse_box(each, scene) for each in box or ()),
+                *parse_colliders(
+                    document,
+                    scene,
+                    spheres=sphere or (),
+                    capsules=capsule or (),
+                    planes=plane or (),
+                    files=[each for each in colliders or () if each != RIGID_BODIES],
+                ),
+                *(_rigid_colliders(document, scene, voice) if RIGID_BODIES in (colliders or ()) else ()),
+            ),
+            attractors=tuple(parse_attractor(each, scene) for each in attractor or ()),
             max_error=0.0
             if max_error is None
             else units.parse_length(max_error, "--max-error", lambda: diagonal(scene)),
@@ -242,6 +257,16 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
     return ", ".join(parts)
 
 
+def _rigid_colliders(document: Document, scene: Scene, voice: Reporter) -> list[Obstacle]:
+    found, others = read_rigid_colliders(document, scene.skeleton)
+    if others:
+        more = f" and {text.plural(len(others) - 1, 'other node')}" if len(others) > 1 else ""
+        voice.warn(
+            f"the collider of {scene.skeleton.label(others[0])}{more} is no sphere, box, capsule or plane: left out"
+        )
+    return found
+
+
 def _check_nodes(run: ParticleRun, form: Form, voice: Reporter, *, force: bool) -> None:
     count = len(run.nodes)
     if count > MAX_NODES and not force:
@@ -252,59 +277,3 @@ def _check_nodes(run: ParticleRun, form: Form, voice: Reporter, *, force: bool) 
         voice.warn(f"{count} nodes: players take about a second to bind their tracks")
     elif count > MANY_DRAWS and form is Form.NODE:
         voice.info(f"note: {count} nodes are as many draw calls; --as skin needs one")
-
-
-def _obstacles(floor: float | None, spheres: list[str], boxes: list[str], scene: Scene) -> tuple[Obstacle, ...]:
-    found: list[Obstacle] = [] if floor is None else [Floor(floor)]
-    for each in spheres:
-        at, node, (radius,) = _place(each, 1, "--sphere", "NODE,R or X,Y,Z,R", scene)
-        found.append(Sphere(at, radius, node))
-    for each in boxes:
-        at, node, (x, y, z) = _place(each, 3, "--box", "NODE,SX,SY,SZ or X,Y,Z,SX,SY,SZ", scene)
-        found.append(Box(at, (x, y, z), node))
-    return tuple(found)
-
-
-def _place(
-    given: str, count: int, option: str, expected: str, scene: Scene
-) -> tuple[tuple[float, float, float], int | None, list[float]]:
-    """A point or a node, and `count` numbers after it."""
-    parts = given.split(",")
-    try:
-        numbers = [float(each) for each in parts[-count - 3 :]]
-        if len(parts) == count + 3 and np.isfinite(numbers).all():
-            return (numbers[0], numbers[1], numbers[2]), None, numbers[3:]
-    except ValueError:
-        pass
-    try:
-        sizes = [float(each) for each in parts[-count:]]
-    except ValueError:
-        sizes = []
-    if len(sizes) != count or len(parts) < count + 1 or not np.isfinite(sizes).all():
-        raise UsageError(f"{option} is '{given}' (expected {expected})")
-    return (0.0, 0.0, 0.0), _node(",".join(parts[:-count]), option, scene), sizes
-
-
-def _attractor(given: str, scene: Scene) -> Attractor:
-    parts = given.split(":")
-    has_radius = len(parts) > 2 and _as_number(parts[-2]) is not None
-    strength = _as_number(parts[-2 if has_radius else -1])
-    name = ":".join(parts[: -2 if has_radius else -1])
-    if strength is None or not name:
-        raise UsageError(f"--attractor is '{given}' (expected NODE:STRENGTH or NODE:STRENGTH:RADIUS)")
-    radius = units.parse_length(parts[-1] if has_radius else ATTRACTOR_RADIUS, "--attractor", lambda: diagonal(scene))
-    return Attractor(strength, radius, _node(name, "--attractor", scene))
-
-
-def _as_number(given: str) -> float | None:
-    try:
-        return float(given)
-    except ValueError:
-        return None
-
-
-def _node(glob: str, option: str, scene: Scene) -> int:
-    found = sorted(Selection((), (glob,)).chosen_nodes(scene.skeleton))
-    if len(found) > 1:
-        raise UsageError(f"{option} '{glob}' names {len(found)} nodes (expected one)")
-    return found[0]

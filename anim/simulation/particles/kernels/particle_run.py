@@ -20,6 +20,7 @@ from anim.simulation.particles.kernels.recording import KEY_WIDTH, MAX_IMPACTS_P
 from anim.simulation.particles.kernels.solids import (
     BALL,
     FLOOR,
+    MOVING,
     TOUCH_M,
     Solids,
     distance,
@@ -255,7 +256,7 @@ def _fly(
             break
         is_near = False
         for k in range(num_shapes):
-            if shapes[k, 0] == FLOOR:
+            if shapes[k, 0] == FLOOR and shapes[k, MOVING] == 0.0:
                 is_near |= x1[1] < poses[0, k, 1] or x[1] < poses[0, k, 1]
             else:
                 i, j = min(n - first, end), min(n + 1 - first, end)

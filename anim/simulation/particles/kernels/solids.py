@@ -18,7 +18,7 @@ from anim.simulation.particles.kernels.vectors import (
 )
 from anim.skinning.kernels.jit import jit
 
-FLOOR, SPHERE, BOX = range(3)
+FLOOR, CAPSULE, BOX = range(3)
 BALL, MOVING = 4, 5  # columns of `shapes`
 MIN_ADVANCE = 1 / 32  # of a step, between two checks of the distance
 MAX_ITERATIONS, ROOT_M = 60, 1e-15  # of the search for an impact
@@ -31,9 +31,10 @@ Pose: TypeAlias = tuple[Vector, Rotation]
 class Solids(NamedTuple):
     """All obstacles of a run.
 
-    shapes: (O, 6): FLOOR, SPHERE or BOX; the radius, or half the sizes of a box, in m; the radius of the ball around
-    it; 1 for a moving one: others are along the axes. poses: (S, O, 7), center and rotation at the ends of steps, or
-    (1, O, 7).
+    shapes: (O, 6): FLOOR, which is a plane where it is turned, CAPSULE or BOX; of a capsule the radius and half its
+    length along y, 0 for a ball, in m, and −1 to keep particles inside, else 1; or half the sizes of a box; the radius
+    of the ball around it; 1 for a moving or turned one: others are along the axes. poses: (S, O, 7), center and
+    rotation at the ends of steps, or (1, O, 7).
     """
 
     shapes: Floats
@@ -49,7 +50,7 @@ def is_moving(solids: Solids, k: int) -> bool:
 @jit
 def is_flat(solids: Solids, k: int) -> bool:
     """Return whether a particle can rest on obstacle k without moving."""
-    return bool(solids.shapes[k, 0] != SPHERE and solids.shapes[k, MOVING] == 0.0)
+    return bool(solids.shapes[k, 0] != CAPSULE and solids.shapes[k, MOVING] == 0.0)
 
 
 @jit
@@ -81,13 +82,20 @@ def to_world(pose: Pose, p: Vector) -> Vector:
 
 
 @jit
+def _from_axis(solids: Solids, k: int, p: Vector) -> Vector:
+    """Vector from the nearest point of a capsule's axis."""
+    half = float(solids.shapes[k, 2])
+    return (p[0], p[1] - min(max(p[1], -half), half), p[2])
+
+
+@jit
 def local_distance(solids: Solids, k: int, p: Vector) -> float:
     """Return the signed distance in m, below 0 inside, of a point relative to obstacle k."""
     kind = solids.shapes[k, 0]
     if kind == FLOOR:
         return p[1]
-    if kind == SPHERE:
-        return length(p) - float(solids.shapes[k, 1])
+    if kind == CAPSULE:
+        return float(solids.shapes[k, 3]) * (length(_from_axis(solids, k, p)) - float(solids.shapes[k, 1]))
     x, y, z = abs(p[0]) - solids.shapes[k, 1], abs(p[1]) - solids.shapes[k, 2], abs(p[2]) - solids.shapes[k, 3]
     outside = length((max(x, 0.0), max(y, 0.0), max(z, 0.0)))
     return outside + float(min(max(x, y, z), 0.0))
@@ -95,13 +103,14 @@ def local_distance(solids: Solids, k: int, p: Vector) -> float:
 
 @jit
 def local_normal(solids: Solids, k: int, p: Vector) -> Vector:
-    """Return the outward normal at the surface's point nearest to p, relative to obstacle k; up at a center."""
+    """Return the outward normal at the surface's point nearest to p, relative to obstacle k; up on an axis."""
     kind = solids.shapes[k, 0]
     if kind == FLOOR:
         return (0.0, 1.0, 0.0)
-    if kind == SPHERE:
-        d = length(p)
-        return (p[0] / d, p[1] / d, p[2] / d) if d > 0.0 else (0.0, 1.0, 0.0)
+    if kind == CAPSULE:
+        q = _from_axis(solids, k, p)
+        d = length(q) * float(solids.shapes[k, 3])
+        return (q[0] / d, q[1] / d, q[2] / d) if d != 0.0 else (0.0, 1.0, 0.0)
     x, y, z = abs(p[0]) - solids.shapes[k, 1], abs(p[1]) - solids.shapes[k, 2], abs(p[2]) - solids.shapes[k, 3]
     sx, sy, sz = -1.0 if p[0] < 0.0 else 1.0, -1.0 if p[1] < 0.0 else 1.0, -1.0 if p[2] < 0.0 else 1.0
     outside = length((max(x, 0.0), max(y, 0.0), max(z, 0.0)))
@@ -163,7 +172,7 @@ def impact_fraction(
     the distance to the surface, which no point of it can pass.
     """
     d0 = distance(solids, k, i, f0, x0)
-    is_floor = solids.shapes[k, 0] == FLOOR
+    is_floor = solids.shapes[k, 0] == FLOOR and not is_moving(solids, k)
     d1 = distance(solids, k, i, f1, x1)
     if is_floor and d1 >= 0.0:  # gravity points down: who ends above was above
         return np.inf

@@ -1,4 +1,4 @@
-"""Colliders of cloth by options: on nodes, at positions, of the file's spring bones, or of a JSON file."""
+"""Colliders of cloth and particles by options: on nodes, at positions, of spring bones, or of a JSON file."""
 
 from __future__ import annotations
 
