@@ -1,9 +1,9 @@
-"""Matching of nodes and clips of two files: by name, then in order."""
+"""Matching of nodes and clips of two files: by name, by the letters of names, then in order."""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -22,6 +22,30 @@ def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
         waiting[name].append(i)
     waiting[""].clear()
     return np.array([waiting[name].pop(0) if waiting.get(name) else -1 for name in old], np.int64)
+
+
+def match_by_letters(old: Sequence[str], new: Sequence[str]) -> Ints:
+    """Return for each name of `old` (N,) the index of the same letters and digits in `new`, −1 without one.
+
+    By name first. Players and tools replace characters such as "." in names: three.js has "FootL" for "Foot.L". Letters
+    that several of the other names have match nothing.
+    match_by_letters(["hip", "Foot.L", "a.b", "ab"], ["Foot_L", "hip", "a_b"]) → 1, 0, −1, −1
+    """
+    found = match_by_name(old, new)
+    taken = set(found.tolist())
+    before = _by_letters((i, name) for i, name in enumerate(old) if found[i] < 0)
+    after = _by_letters((i, name) for i, name in enumerate(new) if i not in taken)
+    for letters in before.keys() & after.keys() - {""}:
+        if len(before[letters]) == len(after[letters]) == 1:
+            found[before[letters][0]] = after[letters][0]
+    return found
+
+
+def _by_letters(names: Iterable[tuple[int, str]]) -> dict[str, list[int]]:
+    result: dict[str, list[int]] = defaultdict(list)
+    for i, name in names:
+        result["".join(filter(str.isalnum, name))].append(i)
+    return result
 
 
 def ambiguous_names(old: Sequence[str], new: Sequence[str]) -> list[str]:
@@ -51,8 +75,8 @@ def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
 def match_nodes(old: Scene, new: Scene) -> Ints:
     """Return for each node of `old` (N,) its index in `new`, −1 without one.
 
-    By name; then joints in order of skins of equal size; then in order among the children of one parent, if one of both
-    has no name or no name is common.
+    By name, then by its letters and digits; then joints in order of skins of equal size; then in order among the
+    children of one parent, if one of both has no name or no name is common.
     """
     return _Nodes(old.skeleton, new.skeleton).joined(_skins(old), _skins(new))
 
@@ -63,9 +87,9 @@ class _Nodes:
     def __init__(self, old: Skeleton, new: Skeleton) -> None:
         self._old, self._new = old, new
         self._children = _children(old), _children(new)
-        self.found = match_by_name(old.names, new.names)
+        self.found = match_by_letters(old.names, new.names)
         self._taken = set(self.found[self.found >= 0].tolist())
-        self._renamed = not self._taken
+        self._renamed = not (match_by_name(old.names, new.names) >= 0).any()
 
     def joined(self, old_skins: list[Ints], new_skins: list[Ints]) -> Ints:
         for one, other in zip(old_skins, new_skins, strict=False):

@@ -6,7 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.measure.compare.name_matching import match_by_name, match_by_name_then_order, match_nodes
+from anim.measure.compare.name_matching import (
+    match_by_letters,
+    match_by_name,
+    match_by_name_then_order,
+    match_nodes,
+)
 from anim.model import Mesh, MeshInstance, Scene, Skeleton, Skin
 from tests.clips import skeleton
 
@@ -33,6 +38,16 @@ def test_nodes_by_name_wherever_they_are() -> None:
     new = Scene(_named(["foot", "extra", "knee", "hip"], [2, -1, 3, 1]), ())
     assert match_nodes(old, new).tolist() == [3, 2, 0]
     assert match_nodes(new, old).tolist() == [2, -1, 1, 0]
+
+
+def test_by_letters_where_a_tool_replaced_other_characters() -> None:
+    assert match_by_letters(["hip", "Foot.L", "Foot.R"], ["Foot_R", "FootL", "hip"]).tolist() == [2, 1, 0]
+    assert match_by_letters(["Foot.L", "Foot_L"], ["Foot_L", "FootL"]).tolist() == [1, 0]
+    assert match_by_letters(["a.b", "ab"], ["a_b"]).tolist() == [-1, -1]
+    assert match_by_letters(["", "."], ["_", ""]).tolist() == [-1, -1]
+    old = Scene(_named(["hip", "Knee.L", "Knee.R"], [-1, 0, 0]), ())
+    new = Scene(_named(["hip", "Knee_R", "Knee_L"], [-1, 0, 0]), ())
+    assert match_nodes(old, new).tolist() == [0, 2, 1]
 
 
 def test_joints_without_names_by_their_order_in_the_skin() -> None:
