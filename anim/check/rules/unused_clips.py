@@ -17,6 +17,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     if not scenes:
         return
     shown = _reachable(file, [root for scene in scenes for root in scene.get("nodes", ())])
+    shown |= _joints(file, shown)
     for report, clip in file.clips():
         targets = {track.node for track in clip.tracks}
         if targets and None not in targets and not targets & shown:
@@ -32,6 +33,17 @@ def _reachable(file: CheckedFile, roots: list[int]) -> set[int | None]:
         if node not in found:
             found.add(node)
             stack = [*stack, *nodes[node].get("children", ())]
+    return found
+
+
+def _joints(file: CheckedFile, shown: set[int | None]) -> set[int | None]:
+    """Return the joints of shown skins with their ancestors, which move vertices wherever they are."""
+    skins = {file.json["nodes"][node].get("skin") for node in shown if node is not None} - {None}
+    found: set[int | None] = set()
+    for joint in (joint for skin in skins for joint in file.json["skins"][skin]["joints"]):
+        while joint >= 0 and joint not in found:
+            found.add(joint)
+            joint = int(file.skeleton.parents[joint])
     return found
 
 
