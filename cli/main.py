@@ -72,6 +72,7 @@ COMMANDS = {
             "gltf-anim resample walk.glb walk30.glb --fps 30",
             "gltf-anim resample hero.glb hero.glb --fps 24 --clip 'Run*' --dry-run",
             "cat walk.glb | gltf-anim resample --fps 30 | gltf-anim inspect",
+            "gltf-anim resample . -o 'out/{path}' --fps 30",
         ),
     ),
     "from-euler": CommandInfo(

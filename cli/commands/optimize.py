@@ -22,7 +22,7 @@ from cli.io import documents
 from cli.options import common
 from cli.reports import optimize_json, optimize_report
 from cli.text import Reporter
-from cli.workflows import optimize_job
+from cli.workflows import many_files, optimize_job
 from cli.workflows.edit_clips import note_images
 from cli.workflows.optimize_job import OptimizeJob
 
@@ -50,7 +50,9 @@ BALANCED = Effort("balanced")
 def command(
     input: common.Input = "-",
     output: common.Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     max_error: Annotated[
         str | None,
         typer.Option(
@@ -148,7 +150,7 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
-) -> None:
+) -> int:
     """Make animations smaller, within an error that no vertex exceeds.
 
     The bound holds for every skinned and morphed vertex at all times, in players that slerp and in players that
@@ -162,56 +164,62 @@ def command(
     The same command on its own output changes nothing. With another bound it starts from that output, and errors add
     up.
     """
-    began = time.perf_counter()
     voice = Reporter(quiet, verbose)
     max_count = None if max_bytes is None else optimize_job.count_of_bytes(max_bytes)
-    _check_outputs(input, output, report, curve_file, dry_run=dry_run)
     if curve_file is not None and (max_bytes is not None or report is not None):
         raise UsageError("--curve goes with neither --max-bytes nor --report")
-    with documents.source(input, voice) as source:
-        work = optimize_job.optimize_job(
-            source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
-        )
-        said = {
-            "max_error": optimize_job.DEFAULT_MAX_ERROR if max_error is None else max_error,
-            "shell": shell,
-            "max_pointer_error": max_pointer_error,
-            "max_angle": max_angle,
-            "max_speed_error": max_speed_error,
-        }
-        bounds = optimize_job.bounds(work.scene, said)
-        for words in optimize_job.notes(said):
-            voice.warn(words)
-        request = Request(
-            bounds,
-            Policy(
-                drop,
-                reference,
-                rebase_rest,
-                drop_invisible,
-                optimize_job.nodes_to_keep(keep_node or (), work.scene),
-            ),
-            Packing.CORE if meshopt is None else Packing(meshopt.value),
-            objective,
-            str(effort),
-            PLAYERS if player is Player.ANY else ("spec",),
-            optimize_job.raw_options(bounds, said),
-        )
-        if curve_file is not None:
-            _draw_curve(work, request, curve_file, voice, dry_run=dry_run)
-            return
-        if max_count is None:
-            found = work.run(request)
-        else:
-            ceiling = None if max_error is None else request.bounds.max_error
-            request, found = work.fitted(request, max_count, ceiling=ceiling)
-        optimize_report.check(found, work.clips, request, work.scale)
-        about = _about(work, request, found, began)
-        with _report(about, voice, report, dry_run=dry_run):
-            documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
-    _report_result(about, voice, dry_run=dry_run)
-    if not dry_run:
-        note_images(about.after, source, output, voice)
+    if out is not None and (report is not None or curve_file is not None):
+        raise UsageError(f"--{'curve' if report is None else 'report'} is about one file: leave out --out")
+
+    def edit(input: str, output: str) -> None:
+        began = time.perf_counter()
+        _check_outputs(input, output, report, curve_file, dry_run=dry_run)
+        with documents.source(input, voice) as source:
+            work = optimize_job.optimize_job(
+                source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
+            )
+            said = {
+                "max_error": optimize_job.DEFAULT_MAX_ERROR if max_error is None else max_error,
+                "shell": shell,
+                "max_pointer_error": max_pointer_error,
+                "max_angle": max_angle,
+                "max_speed_error": max_speed_error,
+            }
+            bounds = optimize_job.bounds(work.scene, said)
+            for words in optimize_job.notes(said):
+                voice.warn(words)
+            request = Request(
+                bounds,
+                Policy(
+                    drop,
+                    reference,
+                    rebase_rest,
+                    drop_invisible,
+                    optimize_job.nodes_to_keep(keep_node or (), work.scene),
+                ),
+                Packing.CORE if meshopt is None else Packing(meshopt.value),
+                objective,
+                str(effort),
+                PLAYERS if player is Player.ANY else ("spec",),
+                optimize_job.raw_options(bounds, said),
+            )
+            if curve_file is not None:
+                _draw_curve(work, request, curve_file, voice, dry_run=dry_run)
+                return
+            if max_count is None:
+                found = work.run(request)
+            else:
+                ceiling = None if max_error is None else request.bounds.max_error
+                request, found = work.fitted(request, max_count, ceiling=ceiling)
+            optimize_report.check(found, work.clips, request, work.scale)
+            about = _about(work, request, found, began)
+            with _report(about, voice, report, dry_run=dry_run):
+                documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
+        _report_result(about, voice, dry_run=dry_run)
+        if not dry_run:
+            note_images(about.after, source, output, voice)
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
 
 
 def _about(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:

@@ -13,6 +13,7 @@ from anim.operations.selection import Selection
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter
+from cli.workflows import many_files
 from cli.workflows.edit_clips import edit_clips
 
 Interpolation = StrEnum("Interpolation", [(name, name) for name in INTERPOLATIONS])  # type: ignore[misc]
@@ -22,7 +23,9 @@ AS_IT_IS = Interpolation(KEEP)
 def command(
     input: common.Input = "-",
     output: common.Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     fps: Annotated[
         float, typer.Option("--fps", metavar="N", help="Frames per second; any number above 0.", show_default=False)
     ],
@@ -36,7 +39,7 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
-) -> None:
+) -> int:
     """Resample clips to a regular grid of frames.
 
     Frame k is at the clip's start + k / fps; start and end stay exact. STEP tracks keep the times of their jumps, and
@@ -45,11 +48,18 @@ def command(
     """
     if not fps > 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
-    edit_clips(
-        input,
-        output,
-        Selection(clip or (), node or (), path or ()),
-        lambda each, tracks, _: resampled(each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks),
-        Reporter(quiet, verbose),
-        dry_run=dry_run,
-    )
+    voice, selection = Reporter(quiet, verbose), Selection(clip or (), node or (), path or ())
+
+    def edit(input: str, output: str) -> None:
+        edit_clips(
+            input,
+            output,
+            selection,
+            lambda each, tracks, _: resampled(
+                each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks
+            ),
+            voice,
+            dry_run=dry_run,
+        )
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)

@@ -154,6 +154,11 @@ def check_output(path: str) -> None:
     A name without extension is a GLB; devices and named pipes (/dev/null) can have any name.
     """
     check_binary(path)
+    check_extension(path)
+
+
+def check_extension(path: str) -> None:
+    """Raise UsageError if the extension of an output is another format's."""
     if path == PIPE or (ending := Path(path).suffix).lower() in ("", *container.SUFFIXES):
         return
     target = resolver.resolve_links(Path(path))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from anim.errors import NotFoundError
@@ -12,29 +13,57 @@ from anim.gltf.io import container
 from cli.io import documents
 
 
+@dataclass(frozen=True, slots=True)
+class FoundFile:
+    """An input file. folder: the named folder, the fixed part of the pattern, or that of the file.
+
+    is_searched: True if a folder or a pattern led to it.
+    """
+
+    path: str
+    folder: str
+    is_searched: bool = False
+
+
 def expand(inputs: Sequence[str]) -> list[str]:
     """Return the files of all inputs, each once: files as they are, of folders all glTF files below them.
 
     A pattern is for shells that do not expand it, or for "**". Raises NotFoundError if one matches nothing.
     """
-    found = [path for each in inputs for path in _expand_one(each)]
-    return list(dict.fromkeys(found))
+    return [found.path for found in find(inputs)]
 
 
-def _expand_one(path: str) -> list[str]:
+def find(inputs: Sequence[str]) -> list[FoundFile]:
+    """Return the files of all inputs, like `expand`, with the folders that they were found in."""
+    found: dict[str, FoundFile] = {}
+    for each in inputs:
+        for file in _find_one(each):
+            found.setdefault(file.path, file)
+    return list(found.values())
+
+
+def _find_one(path: str) -> list[FoundFile]:
     if path in ("", documents.PIPE):  # an empty name is refused where it is opened
-        return [path]
+        return [FoundFile(path, "")]
     if os.path.isdir(path):  # False, not an error, for names that no file can have
         found = sorted(_in_folder(Path(path)))
         if not found:
             raise NotFoundError(f"{path}: has no {' or '.join(container.SUFFIXES)} file")
-        return found
+        return [FoundFile(each, path, is_searched=True) for each in found]
     if glob.has_magic(path) and not os.path.lexists(path):
         found = sorted(each for each in glob.glob(path, recursive=True) if os.path.isfile(each))
         if not found:
             raise NotFoundError(f"{path}: matches no file")
-        return found
-    return [path]
+        return [FoundFile(each, _fixed_folder(path), is_searched=True) for each in found]
+    return [FoundFile(path, os.path.dirname(path) or ".")]
+
+
+def _fixed_folder(pattern: str) -> str:
+    """The folders of a pattern before the first part with a wildcard: "in" of "in/**/*.glb"."""
+    folder = os.path.dirname(pattern)
+    while glob.has_magic(folder):
+        folder = os.path.dirname(folder)
+    return folder or "."
 
 
 def _in_folder(folder: Path) -> Iterator[str]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 
 from cli.errors import UsageError
 
 FORBIDDEN = frozenset('/\\:*?"<>|')  # invalid in names on some file systems
 RESERVED = frozenset(("con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))))
 MAX_NAME_BYTES = 100  # of 255 in most file systems: the pattern may have several, and words around them
+OF_PATHS = ("path", "folder", "name", "stem")  # of names that follow from an input's
 _PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
 
 
@@ -41,6 +43,21 @@ def expand(output: str, rows: Sequence[Mapping[str, str]], numbers: Sequence[int
         names.append(file)
         taken.add(file.casefold())
     return names
+
+
+def fill_path(output: str, path: str) -> str:
+    """Return an output name with OF_PATHS replaced by those of an input's path.
+
+    fill_path("build/{folder}/{stem}.gltf", "crowd/a.glb") → "build/crowd/a.gltf"
+    """
+    pure = PurePath(path)
+    values = {"path": pure.as_posix(), "folder": pure.parent.as_posix(), "name": pure.name, "stem": pure.stem}
+    return PurePath(_filled(output, values)).as_posix()  # "a/./b" → "a/b"
+
+
+def fixed_folder(output: str) -> str:
+    """Return the folders of an output name before its first placeholder: "out" of "out/{path}"."""
+    return output.partition("{")[0].rpartition("/")[0] or ("/" if output.startswith("/") else ".")
 
 
 def _filled(output: str, values: Mapping[str, str]) -> str:

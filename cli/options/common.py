@@ -11,6 +11,19 @@ Input = Annotated[str, typer.Argument(metavar="IN", help="A .glb or .gltf file, 
 Output = Annotated[
     str, typer.Argument(metavar="OUT", help="A .glb or .gltf file, '-' for stdout (GLB).", show_default=False)
 ]
+More = Annotated[
+    list[str] | None, typer.Argument(metavar="FILE...", help="More inputs, with --out.", show_default=False)
+]
+Out = Annotated[
+    str | None,
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="NAME",
+        help="Output of each file, where all names are inputs, also folders and patterns: out/{path}, or {folder}, "
+        "{name}, {stem}.",
+    ),
+]
 Clips = Annotated[
     list[str] | None,
     typer.Option("--clip", metavar="GLOB", help="Only clips with this name or index ('#0'); may be repeated."),

@@ -12,13 +12,12 @@ from cli.io import output_names
 from cli.workflows import config_tables
 from cli.workflows.run.steps import Step, parse_step
 
-PLACEHOLDERS = ("path", "folder", "name", "stem")
 _KEYS: config_tables.Keys = {"name": str, "match": str, "steps": list, "out": str}
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """Steps for the files that match a pattern. out: name of the output, with PLACEHOLDERS in braces.
+    """Steps for the files that match a pattern. out: name of the output, with `output_names.OF_PATHS` in braces.
 
     match and out are relative to the folder of the settings, and use "/".
     """
@@ -33,12 +32,7 @@ class Recipe:
 
         Recipe("", "", (), "build/{folder}/{stem}.gltf").output_of("crowd/a.glb") → "build/crowd/a.gltf"
         """
-        pure = PurePosixPath(path)
-        values = {"path": path, "folder": pure.parent.as_posix(), "name": pure.name, "stem": pure.stem}
-        named = self.out
-        for key, value in values.items():
-            named = named.replace(f"{{{key}}}", value)
-        return PurePosixPath(named).as_posix()  # "a/./b" → "a/b"
+        return output_names.fill_path(self.out, path)
 
 
 @dataclass(frozen=True)
@@ -81,7 +75,7 @@ def _recipe(path: Path, entry: Any, number: int) -> Recipe:
     config_tables.check_keys(path, "recipe", entry, _KEYS)
     where = _label(path, entry, number)
     _check_complete(where, entry)
-    output_names.check_placeholders(entry["out"], PLACEHOLDERS)
+    output_names.check_placeholders(entry["out"], output_names.OF_PATHS)
     steps = [_step(words, number, f"{where}: step {number}") for number, words in enumerate(entry["steps"], 1)]
     return Recipe(entry.get("name", str(number)), entry["match"], tuple(steps), entry["out"])
 

@@ -24,6 +24,7 @@ REFUSED = {  # options that no step can have, by parameter
     "dry_run": "writes nothing",
     "report": "writes a file for every file",
     "depfile": "is about one file",
+    "out": "names files",
     "curve_file": "writes no glTF",
     "find": "writes no glTF",
     "list_eases": "writes no glTF",
@@ -119,7 +120,7 @@ def _parsed(command: Any, step: Step, context: Any) -> dict[str, Any]:
 def _check_values(command: Any, step: Step, values: dict[str, Any]) -> None:
     """Raise UsageError for names of files, and for options that no step can have."""
     for each in command.params:
-        if each.param_type_name == "argument" and values[each.name] not in (PIPE, None):
+        if each.param_type_name == "argument" and values[each.name] and values[each.name] != PIPE:
             problem = f"{step.label}: '{values[each.name]}' is a file (expected options: the recipe has the files)"
             raise UsageError(problem)
         if each.name in REFUSED and values.get(each.name) not in (None, False):

@@ -1,0 +1,118 @@
+"""Workflow of commands on many files: an output for each, by a pattern; a file that fails does not stop the others."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from anim.errors import AnimError, NotFoundError, not_written
+from cli import errors
+from cli.errors import UsageError
+from cli.io import documents, input_files, output_names
+from cli.text import Reporter, plural
+from cli.typer_options import name_options
+
+
+@dataclass(frozen=True, slots=True)
+class FilePair:
+    """Input and output of one file."""
+
+    input: str
+    output: str
+
+
+def edit_named(
+    input: str,
+    output: str,
+    more: Sequence[str],
+    pattern: str | None,
+    edit: Callable[[str, str], object],
+    voice: Reporter,
+    *,
+    dry_run: bool,
+) -> int:
+    """Run `edit` on IN and OUT, or with a pattern of outputs on all named files; return the exit code."""
+    if pattern is None:
+        if more:
+            help = "the command takes IN and OUT; for more inputs name their outputs by --out"
+            raise UsageError(f"got unexpected extra argument ({more[0]})", help=help)
+        edit(input, output)
+        return errors.DONE
+    if not pattern:
+        raise UsageError("--out has an empty name")
+    names = [input, *([] if output == documents.PIPE else [output]), *more]
+    return edit_files(names, pattern, edit, voice, dry_run=dry_run)
+
+
+def edit_files(
+    inputs: Sequence[str], pattern: str, edit: Callable[[str, str], object], voice: Reporter, *, dry_run: bool
+) -> int:
+    """Run `edit` on each input and its output, in order; return the largest exit code.
+
+    inputs: files, folders and patterns. pattern: name of an output with {path}, below the input's folder or the fixed
+    part of its pattern, {folder}, {name} or {stem}; "out/" is "out/{path}". Errors are reported with the file's name.
+    Raises UsageError, before any work, for two inputs with one output, or an output that is another input.
+    """
+    pairs = plan_files(inputs, f"{pattern}{{path}}" if pattern.endswith("/") else pattern)
+    codes = []
+    for pair in pairs:
+        try:
+            if not dry_run:
+                _make_folder(pair.output)
+            edit(pair.input, pair.output)
+        except UsageError:  # of the options, for all files
+            raise
+        except AnimError as error:
+            name_options(error, {})
+            codes.append(errors.report_error(error))
+    if len(pairs) > 1:
+        failed = f", {len(codes)} failed" if codes else ""
+        voice.info(f"{plural(len(pairs), 'file')}{failed}")
+    return max(codes, default=errors.DONE)
+
+
+def plan_files(inputs: Sequence[str], pattern: str) -> list[FilePair]:
+    """Return each input with its output. Files below the folder of the outputs, if a search finds them, are none."""
+    output_names.check_placeholders(pattern, output_names.OF_PATHS)
+    pairs: dict[str, FilePair] = {}
+    found = [each for each in input_files.find(inputs) if not _is_output(each, pattern)]
+    if not found:
+        raise NotFoundError("all files found are outputs", help=f"they are in the folder of '{pattern}'")
+    for each in found:
+        if each.path == documents.PIPE:
+            raise UsageError("stdin has no name for --out: name files")
+        pair = FilePair(each.path, output_names.fill_path(pattern, os.path.relpath(each.path, each.folder)))
+        documents.check_extension(pair.output)
+        same = pairs.setdefault(os.path.realpath(pair.output), pair)
+        if same is not pair:
+            problem = f"'{same.input}' and '{pair.input}' have the same output, '{pair.output}'"
+            raise UsageError(problem, help="--out needs {path}, or {folder} with {name} or {stem}")
+    _check_inputs(list(pairs.values()))
+    return list(pairs.values())
+
+
+def _check_inputs(pairs: Sequence[FilePair]) -> None:
+    """Raise UsageError if an output would replace the input of another file."""
+    inputs = {os.path.realpath(pair.input): pair.input for pair in pairs}
+    for pair in pairs:
+        other = inputs.get(os.path.realpath(pair.output), pair.input)
+        if other != pair.input:
+            raise UsageError(f"the output of '{pair.input}' would replace '{other}', which is an input too")
+
+
+def _is_output(found: input_files.FoundFile, pattern: str) -> bool:
+    """True for a file that a search found in the folder of the outputs, which is inside of the searched one."""
+    folder = Path(os.path.abspath(output_names.fixed_folder(pattern)))
+    searched = Path(os.path.abspath(found.folder))
+    inside = folder != searched and folder.is_relative_to(searched)
+    return found.is_searched and inside and Path(os.path.abspath(found.path)).is_relative_to(folder)
+
+
+def _make_folder(path: str) -> None:
+    folder = Path(path).parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_written(str(folder), error) from None
