@@ -19,7 +19,7 @@ from anim.check.selection import TARGETS, rule_of
 from anim.errors import AnimError, FormatError
 from cli import errors
 from cli.errors import CheckError, UsageError
-from cli.io import documents, input_files
+from cli.io import documents
 from cli.options import common
 from cli.reports import check_ci, check_report, rule_list
 from cli.reports.check_report import CheckReport
@@ -153,8 +153,7 @@ def command(
         unsafe if fix or unsafe else None,
         dry_run,
     )
-    for path in input_files.expand(inputs or [documents.PIPE]):
-        checker.check(path)
+    checker.check_all(inputs or [documents.PIPE])
     checker.warn_of_unused_budgets()
     if budget_report:
         documents.write_text(check_report.budget_table(checker.headroom))
@@ -193,8 +192,16 @@ def _worst(refused: Sequence[tuple[str, AnimError]], files: int) -> int:
     """Report unreadable files in one line; the exit code."""
     if len(refused) < 2:
         return max((errors.report_error(error.at(name, ": ")) for name, error in refused), default=errors.DONE)
-    names = ", ".join(name for name, _ in refused[:MAX_NAMED_FILES]) + (", …" if len(refused) > MAX_NAMED_FILES else "")
-    return errors.report_error(FormatError(f"{len(refused)} of {files} files can't be read: {names}"))
+    unread = [name for name, error in refused if not check_report.is_of_source(error)]
+    of_sources = [name for name, error in refused if check_report.is_of_source(error)]
+    problems = [f"{len(unread)} of {files} files can't be read: {_names(unread)}"] if unread else []
+    if of_sources:
+        problems.append(f"the sources of {len(of_sources)} of {files} files can't be read: {_names(of_sources)}")
+    return errors.report_error(FormatError("; ".join(problems)))
+
+
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(names[:MAX_NAMED_FILES]) + (", …" if len(names) > MAX_NAMED_FILES else "")
 
 
 def _parameters(words: Sequence[str]) -> dict[str, str]:

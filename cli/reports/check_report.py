@@ -15,9 +15,15 @@ from cli.tables import escape_control
 from cli.text import plural
 
 SCHEMA = 1
+SOURCE = "source"  # begins the position of errors in the source of a budget
 MAX_OF_RULE = 3  # findings of a rule listed per file in the text
 MAX_SUMMARY_BYTES = 1_000_000  # of a job summary on GitHub, 1 MiB
 MARKDOWN_ESCAPES = {ord(c): f"&#{ord(c)};" if c in "<>|&" else f"\\{c}" for c in "\\`*_{}[]<>#|~&"}
+
+
+def is_of_source(error: AnimError) -> bool:
+    """Return whether an error is that of a file's source, not of the file."""
+    return error.where.startswith(f"{SOURCE} ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +77,10 @@ def summary(report: CheckReport) -> str:
     if report.gone:
         count = sum(count for _, count in report.gone)
         line += f"; {count} in the baseline no longer found (--write-baseline renews it)"
-    if report.refused:
-        line += f"; {plural(len(report.refused), 'file')} unreadable"
+    if unread := sum(not is_of_source(error) for _, error in report.refused):
+        line += f"; {plural(unread, 'file')} unreadable"
+    if of_sources := len(report.refused) - unread:
+        line += f"; {plural(of_sources, 'source')} unreadable"
     return line
 
 

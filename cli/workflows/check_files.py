@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,8 @@ from anim.check.selection import RuleSelection
 from anim.errors import AnimError, FormatError, UnsupportedError
 from cli import units
 from cli.errors import UsageError
-from cli.io import documents
+from cli.io import documents, input_files
+from cli.reports.check_report import SOURCE
 from cli.text import Reporter, format_length
 from cli.workflows import check_config, checked_files
 from cli.workflows.check_config import Budget, CheckConfig
@@ -71,6 +73,29 @@ class FileChecker:
     _nearest: dict[Path, CheckConfig] = field(default_factory=dict)
     _configs: dict[str, CheckConfig] = field(default_factory=dict)
     _used: set[Budget] = field(default_factory=set)
+
+    def check_all(self, inputs: Sequence[str]) -> None:
+        """Check files, folders and patterns.
+
+        Sources of budgets that a search finds are not checked themselves, unless they have a budget of their own.
+        """
+        found = input_files.find(inputs)
+        sources = {source for each in found if (source := self._source_of(each.path))}
+        for each in found:
+            is_source = each.is_searched and os.path.realpath(each.path) in sources
+            if not is_source or self._config(each.path).budget_of(Path(each.path)) is not None:
+                self.check(each.path)
+
+    def _source_of(self, path: str) -> str:
+        """Real path of the file that the error of another one is measured against, "" without one."""
+        if path in ("", documents.PIPE):
+            return ""
+        config = self._config(path)
+        budget = config.budget_of(Path(path))
+        if budget is None or not budget.error:
+            return ""
+        source = os.path.realpath(config.source_of(Path(path), budget))
+        return source if source != os.path.realpath(path) else ""
 
     def check(self, path: str) -> None:
         """Fix a file, if wanted, and check it."""
@@ -141,7 +166,7 @@ class FileChecker:
             raise
         except AnimError as error:
             fault = checked_files.fault_of(source_path, error)
-            fault.where = f"source {Path(source_path).relative_to(config.folder).as_posix()}"
+            fault.where = f"{SOURCE} {Path(source_path).relative_to(config.folder).as_posix()}"
             fault.help = f"correct `against` of [[budget]] in {Path(config.path).name}"
             return limited, (fault,)
 

@@ -116,6 +116,31 @@ def test_a_missing_source_leaves_the_other_findings_and_limits(folder: Path, cal
     assert "noop.glb: source source/noop.glb: can't be read" in run.err
 
 
+def test_only_the_sources_that_cannot_be_read_are_counted_as_sources(folder: Path, call: Call) -> None:
+    text = '[[budget]]\nmatch = "{}"\nerror = "1mm"\nagainst = "source/{{name}}"\n'
+    (folder / "gltf-anim.toml").write_text(text.format("noop.glb") + text.format("crowd/*"))
+    run = call("check", ".")
+    assert run.code == 3
+    assert run.err == "gltf-anim: the sources of 2 of 2 files can't be read: crowd/arm 1.glb, noop.glb\n"
+    assert run.text.splitlines()[-1].endswith("; 2 sources unreadable")
+    (folder / "a.glb").write_bytes(b"no glTF")
+    problem = "1 of 3 files can't be read: a.glb; the sources of 2 of 3 files can't be read: crowd/arm 1.glb, noop.glb"
+    assert call("check", ".").err == f"gltf-anim: {problem}\n"
+
+
+def test_sources_of_budgets_are_not_checked_themselves_unless_they_are_named(folder: Path, call: Call) -> None:
+    (folder / "source").mkdir()
+    (folder / "source" / "noop.glb").write_bytes(built("noop"))
+    (folder / "source" / "other.glb").write_bytes(built("arm"))
+    budget = '[[budget]]\nmatch = "noop.glb"\nerror = "1mm"\nagainst = "source/{path}"\n'
+    (folder / "gltf-anim.toml").write_text(budget)
+    files = call("check", ".", "--format", "json").json["files"]
+    assert sorted(files) == ["crowd/arm 1.glb", "noop.glb", "source/other.glb"]
+    assert call("check", "source/noop.glb", "--format", "json").json["files"] == ["source/noop.glb"]
+    (folder / "gltf-anim.toml").write_text(budget.replace("source/{path}", "{path}"))
+    assert "noop.glb" in call("check", ".", "--format", "json").json["files"]
+
+
 @pytest.mark.parametrize(
     ("options", "kept"),
     [
