@@ -25,20 +25,27 @@ def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
 
 
 def match_by_letters(old: Sequence[str], new: Sequence[str]) -> Ints:
-    """Return for each name of `old` (N,) the index of the same letters and digits in `new`, −1 without one.
+    """Return for each name of `old` (N,) its index in `new`, −1 without one: by name, or by its letters and digits.
 
-    By name first. Players and tools replace characters such as "." in names: three.js has "FootL" for "Foot.L". Letters
-    that several of the other names have match nothing.
+    Players and tools replace characters such as "." in names: three.js has "FootL" for "Foot.L". By letters go names
+    that the other list lacks or has more or less often, if equally many of each list have these letters.
     match_by_letters(["hip", "Foot.L", "a.b", "ab"], ["Foot_L", "hip", "a_b"]) → 1, 0, −1, −1
     """
-    found = match_by_name(old, new)
-    taken = set(found.tolist())
+    guesses = {*ambiguous_names(old, new)}
+    found = match_by_name(_without(old, guesses), _without(new, guesses))
     before = _by_letters((i, name) for i, name in enumerate(old) if found[i] < 0)
+    taken = set(found.tolist())
     after = _by_letters((i, name) for i, name in enumerate(new) if i not in taken)
     for letters in before.keys() & after.keys() - {""}:
-        if len(before[letters]) == len(after[letters]) == 1:
-            found[before[letters][0]] = after[letters][0]
-    return found
+        if len(before[letters]) == len(after[letters]):
+            found[before[letters]] = after[letters]
+    taken = set(found.tolist())
+    rest = match_by_name(old, ["" if i in taken else name for i, name in enumerate(new)])
+    return np.where(found >= 0, found, rest)
+
+
+def _without(names: Sequence[str], left_out: set[str]) -> list[str]:
+    return ["" if name in left_out else name for name in names]
 
 
 def _by_letters(names: Iterable[tuple[int, str]]) -> dict[str, list[int]]:

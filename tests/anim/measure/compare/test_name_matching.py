@@ -45,6 +45,8 @@ def test_by_letters_where_a_tool_replaced_other_characters() -> None:
     assert match_by_letters(["Foot.L", "Foot_L"], ["Foot_L", "FootL"]).tolist() == [1, 0]
     assert match_by_letters(["a.b", "ab"], ["a_b"]).tolist() == [-1, -1]
     assert match_by_letters(["", "."], ["_", ""]).tolist() == [-1, -1]
+    assert match_by_letters(["Foot.L", "hip", "Foot.L"], ["Foot_L", "hip", "Foot.L"]).tolist() == [0, 1, 2]
+    assert match_by_letters(["a", "a", "b"], ["a", "b"]).tolist() == [0, -1, 1]
     old = Scene(_named(["hip", "Knee.L", "Knee.R"], [-1, 0, 0]), ())
     new = Scene(_named(["hip", "Knee_R", "Knee_L"], [-1, 0, 0]), ())
     assert match_nodes(old, new).tolist() == [0, 2, 1]
