@@ -12,7 +12,7 @@ from anim.simulation.spring_bones.chains import SpringBones, SpringChain, Spring
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.penetration import deepest_penetration
 from anim.simulation.spring_bones.simulate import SpringOptions, simulate_springs
-from tests.anim.simulation.spring_bones.test_simulate import BONES, CHAIN, swaying
+from tests.anim.simulation.spring_bones.swaying import BONES, CHAIN, swaying
 from tests.clips import skeleton, track
 
 SPHERE, CAPSULE, PLANE = ColliderShape

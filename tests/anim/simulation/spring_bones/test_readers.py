@@ -19,7 +19,7 @@ from anim.simulation.spring_bones.chains import SpringBones, SpringJoint, Spring
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.json_reader import read_spring_file
 from anim.simulation.spring_bones.read import read_spring_bones
-from tests.anim.simulation.spring_bones.test_simulate import rig
+from tests.anim.simulation.spring_bones.test_chain_globs import rig
 from tests.files import opened_fixture, opened_path
 
 SPRINGS, EXTENDED = "VRMC_springBone", "VRMC_springBone_extended_collider"

@@ -18,7 +18,7 @@ from anim.simulation.spring_bones.read import read_spring_bones
 from anim.simulation.spring_bones.report import make_report, step_error
 from anim.simulation.spring_bones.simulate import SpringOptions, simulate_springs
 from anim.simulation.spring_bones.stability import compare_springs
-from tests.anim.simulation.spring_bones.test_simulate import BONES, CHAIN, swaying
+from tests.anim.simulation.spring_bones.swaying import BONES, CHAIN, swaying
 from tests.files import opened_fixture
 
 OSCILLATORS = BONES.with_parameters(frequency=4.0, damping_ratio=1.0)
