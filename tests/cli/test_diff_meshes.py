@@ -126,3 +126,18 @@ def test_a_lost_primitive_is_named(pair: Pair, call: Call) -> None:
     (warning,) = call("diff", twice, once, "--format", "json").json["warnings"]
     assert warning == f"{once}: mesh 'body' has fewer primitives in the second file: the first one's are measured"
     assert call("diff", once, twice, "--format", "json").json["warnings"] == []
+
+
+def test_a_lost_mesh_is_named(pair: Pair, call: Call) -> None:
+    """The first file has a second mesh, on a node of its own."""
+
+    def change(json: Json) -> None:
+        json["nodes"].append({"name": "prop", "mesh": len(json["meshes"])})
+        json["scenes"][0]["nodes"].append(len(json["nodes"]) - 1)
+        attributes = {"POSITION": json["meshes"][0]["primitives"][0]["attributes"]["POSITION"]}
+        json["meshes"].append({"name": "prop", "primitives": [{"attributes": attributes}]})
+
+    once, twice = pair(change)
+    (warning,) = call("diff", twice, once, "--format", "json").json["warnings"]
+    assert warning == f"{once}: mesh 'prop' has no counterpart in the second file: the first one's are measured"
+    assert call("diff", once, twice, "--format", "json").json["warnings"] == []

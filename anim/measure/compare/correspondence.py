@@ -13,20 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.measure.compare import name_matching
-from anim.measure.compare.deformation import is_reduced, same_influences, same_targets
+from anim.measure.compare import mesh_space, name_matching
+from anim.measure.compare.deformation import are_missing, is_reduced, same_influences, same_targets
 from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
-from anim.model import Mesh, MeshInstance, Scene, Skin
+from anim.model import MeshInstance, Scene, Skin
 from anim.sampling import rest_pose as rest
 from anim.sampling.world import local_by_node
-
-SAME_SPACE_TOLERANCE = 0.01  # of a mesh's size: vertices at a larger distance are different ones
-SINGULAR = 1e-12  # determinants below this, relative to the cube of the size, have no inverse
-SAME_SPACE = 1e-3  # relative; joints whose matrices differ by more have another bind pose, not another mesh space
-NOWHERE = np.eye(4)[:3]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +33,7 @@ class Correspondence:
     by_vertex: whether all meshes agree vertex by vertex, with their joints, weights and morph targets.
     unskinned, skinned: names of meshes with a skin in the first or second scene only. reweighted: names of meshes whose
     vertices agree, but not their joints, weights or morph targets. reduced: names of meshes that lost primitives.
-    has_meshes, had_meshes: False if only the first or only the second scene has vertices.
+    lost: names of meshes that the second scene lacks. has_meshes, had_meshes: False if only one scene has vertices.
     """
 
     nodes: Ints
@@ -50,6 +45,7 @@ class Correspondence:
     reduced: tuple[str, ...] = ()
     has_meshes: bool = True
     had_meshes: bool = True
+    lost: tuple[str, ...] = ()
 
 
 def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
@@ -95,6 +91,7 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
         tuple(reweighted),
         tuple(reduced),
         pairing.has_meshes,
+        lost=tuple(surfaces[i].name for i in pairing.lost(instances)),
     )
 
 
@@ -114,13 +111,13 @@ class _SceneMatcher:
         """The instance of the other scene with the same vertices: same node, same name, same order."""
         skinned = instance.skin is not None
         choices = [each for each in self._choices(number, instance) if (each.skin is not None) is skinned]
-        return next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
+        return next((each for each in choices if mesh_space.same_vertices(instance.mesh, each.mesh)), None)
 
     def opposite(self, number: int, instance: MeshInstance) -> MeshInstance | None:
         """A skinned instance's partner without skin, or the reverse: by vertices, or by the node's name."""
         is_skinned = instance.skin is not None
         choices = [each for each in self._choices(number, instance) if (each.skin is not None) is not is_skinned]
-        found = next((each for each in choices if _agree(instance.mesh, each.mesh)), None)
+        found = next((each for each in choices if mesh_space.same_vertices(instance.mesh, each.mesh)), None)
         there = self._on_node.get(int(self.nodes[instance.node]))
         name = self._scene.skeleton.names[instance.node]
         if found is None and there in choices and there and name and name == self._other.skeleton.names[there.node]:
@@ -133,6 +130,11 @@ class _SceneMatcher:
         faces = [sum(len(each.mesh.faces) for each in scene.instances) for scene in (self._scene, self._other)]
         return bool(lost) and all(lost) and faces[1] < faces[0]
 
+    def lost(self, instances: Sequence[MeshInstance]) -> list[int]:
+        """Indices of instances that the other scene lacks, if exactly their vertices are missing there."""
+        found = [i for i, instance in enumerate(instances) if not self._choices(i, instance)]
+        return found if are_missing(instances, found, self._new) else []
+
     @property
     def has_meshes(self) -> bool:
         """Return whether the other scene has vertices."""
@@ -141,8 +143,12 @@ class _SceneMatcher:
     def rigid(self, surface: Surface, instance: MeshInstance, bare: MeshInstance) -> Binding:
         """A skinned surface on the node of its mesh, which has no skin in the other scene."""
         points, others = instance.mesh.positions, bare.mesh.positions
-        space = _space(points, others) if _agree(instance.mesh, bare.mesh) else _space_of_boxes(points, others)
-        bind = np.broadcast_to(NOWHERE if space is None else space, surface.bind.shape)
+        space = (
+            mesh_space.from_points(points, others)
+            if mesh_space.same_vertices(instance.mesh, bare.mesh)
+            else mesh_space.from_boxes(points, others)
+        )
+        bind = np.broadcast_to(mesh_space.IDENTITY if space is None else space, surface.bind.shape)
         found = Binding(np.full(len(surface.nodes), bare.node, np.int64), bind, bare.node, surface.rest_weights)
         return replace(found, rest_weights=bare.weights) if len(bare.weights) == len(surface.rest_weights) else found
 
@@ -167,8 +173,8 @@ class _SceneMatcher:
     def by_nodes(self, surface: Surface) -> Binding:
         """Joints of a surface without a partner, from the correspondence of nodes alone."""
         places = [self._place(int(node)) for node in surface.nodes]
-        joints = np.array([node for node, _ in places], np.int64)
         bind = np.array([matrix.multiply(local, bind) for (_, local), bind in zip(places, surface.bind, strict=True)])
+        joints = np.array([node for node, _ in places], np.int64)
         return Binding(joints, bind.reshape(-1, 3, 4), -1, surface.rest_weights)
 
     def _rigid(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
@@ -177,7 +183,7 @@ class _SceneMatcher:
         if there is None or there.skin is not None:
             return self.by_nodes(surface)
         points, others = instance.mesh.positions, there.mesh.positions
-        space = _space(points, others) if partner is not None else _space_of_boxes(points, others)
+        space = mesh_space.from_points(points, others) if partner is not None else mesh_space.from_boxes(points, others)
         if space is None:  # merged with others: only the nodes are known
             return self._above(surface)
         return Binding(np.array([there.node]), space[None], -1, surface.rest_weights)
@@ -193,12 +199,12 @@ class _SceneMatcher:
             return plain
         new, joints = max(matched, key=lambda each: int((each[1] >= 0).sum()))
         found = joints >= 0
-        guess = None if partner is None else _space(instance.mesh.positions, partner.mesh.positions)
-        space = _space_of_binds(skin.inverse_bind[found], new.inverse_bind[joints[found]], guess)
+        guess = None if partner is None else mesh_space.from_points(instance.mesh.positions, partner.mesh.positions)
+        space = mesh_space.from_binds(skin.inverse_bind[found], new.inverse_bind[joints[found]], guess)
         nodes, bind = plain.nodes.copy(), plain.bind.copy()
         nodes[found] = new.joints[joints[found]]
         bind[found] = new.inverse_bind[joints[found]]
-        if space is not NOWHERE:
+        if space is not mesh_space.IDENTITY:
             bind[found] = matrix.multiply(bind[found], space)
         return Binding(nodes, bind, -1, surface.rest_weights)
 
@@ -216,7 +222,7 @@ class _SceneMatcher:
 
     def _place(self, node: int) -> tuple[int, Floats]:
         """The other scene's node for a node, −1 for the world, and the transform between them at rest."""
-        local: Floats = NOWHERE
+        local: Floats = mesh_space.IDENTITY
         while node >= 0 and self.nodes[node] < 0:
             local = matrix.multiply(self._local[node], local)
             node = int(self._scene.skeleton.parents[node])
@@ -232,63 +238,9 @@ class _SceneMatcher:
 
 def _deform_alike(old: MeshInstance, new: MeshInstance, carried: Binding) -> bool:
     """Return whether two instances of the same vertices have the same joints, weights and morph targets."""
-    space = _space(old.mesh.positions, new.mesh.positions)
+    space = mesh_space.from_points(old.mesh.positions, new.mesh.positions)
     if not same_targets(old.mesh, new.mesh, space):
         return False
     if old.skin is None or new.skin is None:
         return True
     return same_influences(old.mesh, carried.nodes, new.mesh, new.skin.joints)
-
-
-def _agree(old: Mesh, new: Mesh) -> bool:
-    """Return whether both have the same vertices in the same order, possibly in another mesh space."""
-    a, b = old.positions, new.positions
-    if len(a) != len(b):
-        return False
-    space = _space(a, b)
-    rest = np.linalg.norm(matrix.apply(space, a) - b, axis=1).max()
-    return bool(rest <= SAME_SPACE_TOLERANCE * np.linalg.norm(np.ptp(b, axis=0)) and space[0, 0] > 0)
-
-
-def _space(a: Floats, b: Floats) -> Floats:
-    """b_from_a (3, 4): translation and uniform scale from points a (V, 3) to b, by least squares."""
-    if np.array_equal(a, b):
-        return NOWHERE
-    middle_a, middle_b = a.mean(axis=0), b.mean(axis=0)
-    spread = float(((a - middle_a) ** 2).sum())
-    factor = float(((a - middle_a) * (b - middle_b)).sum()) / spread if spread > 0 else 1.0
-    return np.column_stack((factor * np.eye(3), middle_b - factor * middle_a))
-
-
-def _space_of_boxes(a: Floats, b: Floats) -> Floats | None:
-    """b_from_a (3, 4) from the boxes around points a and b, in any order; None for other proportions."""
-    sizes = [np.ptp(each, axis=0) for each in (a, b)]
-    middles = [(each.max(axis=0) + each.min(axis=0)) / 2 for each in (a, b)]
-    limit = SAME_SPACE_TOLERANCE * float(np.linalg.norm(sizes[1]))
-    if max(np.abs(sizes[0] - sizes[1]).max(), np.abs(middles[0] - middles[1]).max()) <= limit:
-        return NOWHERE
-    longest = int(sizes[0].argmax())
-    factor = float(sizes[1][longest] / sizes[0][longest]) if sizes[0][longest] > 0 else 1.0
-    if np.abs(factor * sizes[0] - sizes[1]).max() > limit:
-        return None
-    return np.column_stack((factor * np.eye(3), middles[1] - factor * middles[0]))
-
-
-def _space_of_binds(a: Floats, b: Floats, guess: Floats | None) -> Floats:
-    """b_from_a (3, 4) from inverse bind matrices a and b (J, 3, 4), a = b · b_from_a; else from vertices.
-
-    Vertices give it within their rounding, the matrices exactly; but other tools may have changed the bind pose of
-    joints.
-    """
-    if not len(a) or np.array_equal(a, b):
-        return NOWHERE
-    size = np.sqrt((b[..., :3] ** 2).sum(axis=(-1, -2)))
-    regular: Bools = np.asarray(np.abs(np.linalg.det(b[..., :3])) > SINGULAR * size**3)
-    if not regular.any():
-        return NOWHERE if guess is None else guess
-    back = np.linalg.inv(b[regular][..., :3])
-    spaces = np.concatenate((back @ a[regular][..., :3], back @ (a - b)[regular][..., 3:]), axis=-1)
-    middle: Floats = np.median(spaces, axis=0)
-    apart = np.sqrt(((spaces - middle) ** 2).sum(axis=(-1, -2))) / np.sqrt((middle * middle).sum())
-    is_one = float(np.median(apart)) <= SAME_SPACE
-    return middle if is_one or guess is None else guess

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.model import Mesh
+from anim.model import Mesh, MeshInstance
 
 WEIGHT_TOLERANCE = 0.02  # four weights stored as bytes, their rounding added to one of them: 4 · 1 / 255
 TARGET_TOLERANCE_PER_SIZE = 1e-3  # of the mesh's size: displacements stored in 10 bits
@@ -50,3 +52,9 @@ def is_reduced(old: Mesh, new: Mesh) -> bool:
     if len(new.primitives) >= len(old.primitives) or len(new.positions) >= len(old.positions):
         return False
     return len(old.faces) - len(new.faces) >= min(each.faces for each in old.primitives)
+
+
+def are_missing(old: Sequence[MeshInstance], some: Sequence[int], new: Sequence[MeshInstance]) -> bool:
+    """Return whether the second scene lacks exactly the vertices of some instances: merged meshes keep them."""
+    before, after = (sum(len(each.mesh.positions) for each in instances) for instances in (old, new))
+    return bool(new) and before - after == sum(len(old[i].mesh.positions) for i in some)

@@ -123,6 +123,8 @@ def _mesh_warnings(pairs: Correspondence) -> Iterator[str]:
         yield f"{_listed(pairs.skinned)} a skin in the second file only: measured as the node of the mesh moves it"
     if pairs.reduced:
         yield f"{_listed(pairs.reduced)} fewer primitives in the second file: the first one's are measured"
+    if pairs.lost:
+        yield f"{_listed(pairs.lost)} no counterpart in the second file: the first one's are measured"
     if pairs.reweighted:
         yield (
             f"{_listed(pairs.reweighted)} other joints, weights or morph targets in the second file: "
