@@ -32,7 +32,8 @@ def test_the_root_is_one_of_the_figure() -> None:
     box = clips.clip(clips.track("translation", [0, 1], [[0, 0, 0], [1, 0, 0]], node=2))
     of_skin = figure_nodes({"skins": [{"joints": [1]}]}, nodes)
     assert of_skin == {0, 1}
-    assert figure_nodes({"scenes": [{"nodes": [2]}, {"nodes": [0]}], "scene": 1}, nodes) == {0, 1}
+    scenes = [{"nodes": [2]}, {"nodes": [0]}]
+    assert figure_nodes({"scenes": scenes, "scene": 1, "nodes": [{"children": [1]}, {}, {}]}, nodes) == {0, 1}
     assert figure_nodes({}, nodes) == {0, 1, 2}
     assert root_motions(nodes, [box], figure=of_skin) == [RootMotion(-1, 0.0, 0.0)]
     assert root_motions(nodes, [box])[0].root == 2
