@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -242,3 +243,22 @@ def test_broken_recipes_are_refused(folder: Path, call: Call) -> None:
     path.write_text("[[recipe]]\nmatch='*.glb'\nsteps = ['convert']\nout = 'b/{path}'\n")
     assert "crowd/arm 1.glb: matches no recipe" in refusal(call("run", "crowd"), 2)
     assert "there is no recipe 'x'" in refusal(call("run", "--recipe", "x"), 2)
+
+
+def test_a_terminal_shows_the_file_that_was_done(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, *PLAIN)
+    monkeypatch.setattr("cli.progress.DELAY_S", 0)
+    monkeypatch.setattr("cli.progress.UPDATE_INTERVAL_S", 0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    err = call("run", "--jobs", "1").err
+    assert "\r1 of 2, crowd/arm 1.glb ███" in err
+    assert err.endswith(" s\n")
+
+
+def test_steps_show_no_progress_of_their_own(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_recipe(folder, "optimize")
+    monkeypatch.setattr("cli.progress.DELAY_S", 0)
+    monkeypatch.setattr("cli.progress.UPDATE_INTERVAL_S", 0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert "optimize" not in call("run").err
