@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -48,6 +49,8 @@ def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
         if not isinstance(value, kind):
             expected = kind.__name__ if isinstance(kind, type) else "a number"
             raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {expected})")
+        if isinstance(value, float) and not math.isfinite(value):  # a limit that no file exceeds
+            raise UsageError(f"{path}: {where} is {value} (expected a finite number)")
 
 
 def _table(path: Path) -> dict[str, Any] | None:

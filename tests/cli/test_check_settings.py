@@ -91,6 +91,7 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     [
         ('match = "*"\nbyte = 3', "did you mean bytes?"),
         ('match = "*"\nbytes = "3 MB"', "budget.bytes is str (expected a number)"),
+        ('match = "*"\nbytes = nan', "budget.bytes is nan (expected a finite number)"),
         ("bytes = 3", "has no match"),
         ('match = "*"\nerror = "1mm"', "has no against"),
     ],
