@@ -112,12 +112,15 @@ def describe_elongation(worst: Mapping[str, Any] | None, substeps: int, limit: f
     return f"{stretched} with {substeps} substeps a frame (limit {100 * limit:.3g} %)"
 
 
-def advise_elongation(solver: str, *, is_start: bool = False) -> str:
+def advise_elongation(solver: str, *, is_start: bool = False, is_attachment: bool = False) -> str:
     """Return advice for a cloth that is stretched beyond the limit in spite of many substeps.
 
-    is_start: the pose that it begins with is the one that is stretched.
+    is_start: the pose that it begins with is the one that is stretched. is_attachment: the animation moves pinned
+    vertices farther apart than the cloth between them is long.
     """
     if is_start:
         return "the clip's first pose stretches it: --warm-up 1 lets it relax before"
+    if is_attachment:
+        return "the clip stretches the vertices that it is attached to: choose others with --cloth or --pin"
     fabric = {"mass-spring": "a higher --stiffness", "relaxation": "more --iterations"}
     return f"a larger --max-stretch, a higher --fps, or {fabric.get(solver, 'a mesh with longer edges')}"

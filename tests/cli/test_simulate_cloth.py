@@ -187,6 +187,22 @@ def test_cloth_that_the_first_pose_stretches_is_advised_to_warm_up(
     assert run.err.splitlines()[-1] == "help: the clip's first pose stretches it: --warm-up 1 lets it relax before"
     relaxed = call("simulate", "cloth", fixture("biped"), out, *args, "--max-stretch", "5%", "--warm-up", "1")
     assert relaxed.code == 0, relaxed.err
+    loose = call("simulate", "cloth", fixture("biped"), out, *args)
+    assert " at 0.00 s, by the clip's first pose" in loose.err
+
+
+def test_the_largest_stretch_chooses_the_step_and_states_it(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    report = tmp_path / "report.json"
+    args = ("--mesh", "flag", "--pin", "x-min", "--duration", "0.5", "--step", "1/60", "--report", report)
+    loose = call("simulate", "cloth", fixture("flag"), tmp_path / "a.npz", *args)
+    assert "steps of 1/60 s" in loose.err
+    assert json.loads(report.read_text())["worst_stretch"]["fraction"] > 0.02
+    run = call("simulate", "cloth", fixture("flag"), tmp_path / "b.npz", *args, "--max-stretch", "2%")
+    found = json.loads(report.read_text())
+    assert (run.code, found["substeps"] in (2, 4, 8, 16, 32, 64)) == (0, True), run.err
+    assert found["worst_stretch"]["fraction"] <= 0.02
+    assert found["step_s"] == pytest.approx(1 / 60 / found["substeps"])
+    assert f"steps of 1/{60 * found['substeps']} s (chosen for --max-stretch)" in run.err
 
 
 @pytest.mark.parametrize(

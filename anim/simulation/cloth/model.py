@@ -8,6 +8,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.errors import NotFoundError, RangeError
+from anim.simulation.cloth.hierarchy import Hierarchy, build_hierarchy
 from anim.simulation.cloth.tethers import order_outward, tether_lengths
 from anim.simulation.cloth.topology import ClothTopology, build_topology
 
@@ -46,7 +47,7 @@ class ClothModel:
     pinned: (N,) indices of points that follow the animation. edge_lengths, hinge_lengths: (E,), (H,) m at rest.
     anchors, tethers: for each point K pinned ones, the nearest first, −1 for none, and the lengths along the mesh,
     (P, K) m. outward: (E,) indices of the edges, those near pinned points first.
-    self_collision: m, distance that points keep from each other; 0 for none.
+    hierarchy: limits between distant points. self_collision: m, distance that points keep from each other; 0 for none.
     """
 
     topology: ClothTopology
@@ -58,6 +59,7 @@ class ClothModel:
     anchors: Ints
     tethers: Floats
     outward: Ints
+    hierarchy: Hierarchy
     self_collision: float
 
 
@@ -83,10 +85,21 @@ def build_cloth(
     indices = np.flatnonzero(fixed & used)
     anchors, tethers = tether_lengths(topology, x, indices)
     outward = order_outward(topology.edges, tethers[:, 0])
+    hierarchy = build_hierarchy(topology, x, fixed)
     edge_lengths, hinge_lengths = _lengths(x, topology.edges), _lengths(x, topology.hinges)
     gap = SELF_COLLISION_PER_EDGE * float(edge_lengths.min()) if self_collision else 0.0
     return ClothModel(
-        topology, x, inverse, np.flatnonzero(fixed), edge_lengths, hinge_lengths, anchors, tethers, outward, gap
+        topology,
+        x,
+        inverse,
+        np.flatnonzero(fixed),
+        edge_lengths,
+        hinge_lengths,
+        anchors,
+        tethers,
+        outward,
+        hierarchy,
+        gap,
     )
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Floats
 from anim.simulation.cloth.comparison import compare
 from anim.simulation.cloth.driver import ClothDriver
+from anim.simulation.cloth.elongation import FrameElongation, attachment_elongation, measure_elongation
 from anim.simulation.cloth.loop import LoopSeam
 from anim.simulation.cloth.mass_spring_solver import as_mass_spring
 from anim.simulation.cloth.model import ClothModel
@@ -27,10 +29,11 @@ from anim.simulation.report import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClothFrames:
-    """Frames of all points (F, P, 3) m, their energies (F,) J, and the seam of a loop."""
+    """Frames of all points (F, P, 3) m, their energies (F,) J, their elongations, and the seam of a loop."""
 
     positions: Floats
     energies: Floats
+    elongations: Sequence[FrameElongation]
     seam: LoopSeam | None = None
 
 
@@ -43,10 +46,14 @@ def make_report(
     error: float | None,
 ) -> SimulationReport:
     """Return the report of a run. error: m, largest distance to the same run with half the step."""
-    worst = _worst_stretch(model, frames.positions, options.fps)
+    worst = _worst_stretch(model, frames, options.fps)
     advice = ""
     if describe_elongation(worst, substeps, options.max_stretch):
-        advice = advise_elongation(options.solver, is_start=worst["time_s"] == 0)
+        advice = advise_elongation(
+            options.solver,
+            is_start=worst["time_s"] == 0,
+            is_attachment=worst["attachment"] > (options.max_stretch or 0.0),
+        )
     seam = frames.seam
     return _report(
         model,
@@ -71,15 +78,6 @@ def make_failed_report(
     advice = advise_half_step(1.0 / (options.fps * substeps))
     bad_step = max(bad_frame - 1, 0) * substeps + 1
     return _report(model, driver, options, substeps, advice, {}, first_bad_step=bad_step)
-
-
-def worst_edges(model: ClothModel, positions: Floats) -> tuple[Ints, Floats]:
-    """Return the edge (F,) with a free end that is stretched most at each frame, and its relative elongation (F,)."""
-    from anim.simulation.cloth.kernels.constraints import find_longest
-
-    edges, elongation = np.empty(len(positions), np.int64), np.empty(len(positions))
-    find_longest(positions, model.inverse_masses, model.topology.edges, model.edge_lengths, edges, elongation)
-    return edges, elongation
 
 
 def _report(
@@ -150,13 +148,20 @@ def _penetration(model: ClothModel, driver: ClothDriver, options: ClothOptions, 
     return float(deepest)
 
 
-def _worst_stretch(model: ClothModel, positions: Floats, fps: float) -> dict[str, Any]:
-    edges, found = worst_edges(model, positions)
-    frame = int(found.argmax())
-    where = positions[frame, model.topology.edges[edges[frame]]].mean(axis=0)
+def _worst_stretch(model: ClothModel, frames: ClothFrames, fps: float) -> dict[str, Any]:
+    """Largest elongation of an edge with a free end at the end of any step, and those of both kinds of edges."""
+    fractions = np.array([each.fractions for each in frames.elongations])
+    frame, kind = np.unravel_index(int(fractions.argmax()), fractions.shape)
+    worst = frames.elongations[int(frame)]
+    where = frames.positions[frame, model.topology.edges[worst.edges[kind]]].mean(axis=0)
+    last = measure_elongation(model, frames.positions[-1])
+    free, attached = np.maximum(fractions.max(axis=0), 0.0)
     return {
-        "fraction": float(found[frame]),
+        "fraction": float(fractions[frame, kind]),
         "where": [round(float(value), 6) for value in where],
-        "time_s": float(frame / fps),
-        "at_end": float(found[-1]),
+        "time_s": float(frame / fps - worst.ages[kind]),
+        "at_end": last.largest,
+        "free_edges": float(free),
+        "attached_edges": float(attached),
+        "attachment": attachment_elongation(model, frames.positions),
     }

@@ -11,7 +11,7 @@ from anim.simulation.cloth.driver import ClothDriver
 from anim.simulation.cloth.mass_spring_solver import as_mass_spring, run_mass_spring
 from anim.simulation.cloth.model import ClothModel
 from anim.simulation.cloth.options import ClothOptions
-from anim.simulation.cloth.solver import MAX_ELONGATION, XPBD_SWEEPS, run_xpbd
+from anim.simulation.cloth.solver import MAX_ELONGATION, run_xpbd
 
 ELONGATION_PER_LIMIT = 0.5  # what solvers are left of the largest stretch, since one sweep moves the next edge
 
@@ -25,7 +25,7 @@ def run_solver(
         system = as_mass_spring(model, fabric, environment, options.stiffness)
         return run_mass_spring(model, system, fabric, environment, driver, integrator=options.integrator, **timing)
     limits: dict[str, Any] = {
-        "iterations": XPBD_SWEEPS,
+        "iterations": None,
         "max_elongation": min(MAX_ELONGATION, ELONGATION_PER_LIMIT * (options.max_stretch or 1.0)),
     }
     if options.solver == "relaxation":

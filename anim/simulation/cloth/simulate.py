@@ -12,10 +12,11 @@ from anim.arrays import Bools, Floats
 from anim.errors import RangeError, UnstableError
 from anim.model import Clip, FrameChunk, Scene, VertexCache
 from anim.simulation.cloth.driver import ClothDriver
+from anim.simulation.cloth.elongation import ElongationRecord, join_elongations, measure_elongation
 from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop
 from anim.simulation.cloth.model import ClothModel, build_cloth
 from anim.simulation.cloth.options import SOLVERS, ClothOptions
-from anim.simulation.cloth.report import ClothFrames, make_failed_report, make_report, worst_edges
+from anim.simulation.cloth.report import ClothFrames, make_failed_report, make_report
 from anim.simulation.cloth.runs import run_solver
 from anim.simulation.report import SimulationReport
 from anim.skinning.bake import prepare_bake
@@ -72,9 +73,9 @@ def _simulate_under_limit(model: ClothModel, driver: ClothDriver, options: Cloth
     substeps = options.substeps
     while options.max_stretch is not None and 2 * substeps <= MAX_SUBSTEPS:
         frames = _simulate(model, driver, options, substeps, stop_above=options.max_stretch)
-        if worst_edges(model, frames.positions)[1].max() <= options.max_stretch:
+        if max(each.largest for each in frames.elongations) <= options.max_stretch:
             return substeps, frames
-        if worst_edges(model, frames.positions[:1])[1][0] > options.max_stretch:
+        if frames.elongations[0].largest > options.max_stretch:
             break  # the first pose itself is stretched
         substeps *= 2
     return substeps, _simulate(model, driver, options, substeps)
@@ -86,30 +87,42 @@ def _simulate(
     """All frames; without a loop, only those up to the first with an edge that is longer than `stop_above`."""
     positions: list[Floats] = []
     energies: list[float] = []
-    num_done = 0
+    num_done, record = 0, ElongationRecord()
 
     def counted() -> Iterator[tuple[Floats, float]]:
         nonlocal num_done
-        for frame in _frames(model, driver, options, substeps):
+        for frame in _frames(model, driver, options, substeps, record):
             num_done += 1
             yield frame
 
     try:
         if options.loop:
-            return ClothFrames(*close_loop(counted(), options.num_frames, options.fps))
+            return _loop(model, options, counted(), record)
         for x, energy in counted():
             positions.append(x)
             energies.append(energy)
-            if stop_above < np.inf and worst_edges(model, x[None])[1][0] > stop_above:
+            if record.frames[-1].largest > stop_above:
                 break
     except UnstableError as error:
         found = make_failed_report(model, driver, options, substeps, num_done)
         raise error.with_report(found).advise(found.advice) from None
-    return ClothFrames(np.array(positions), np.array(energies))
+    return ClothFrames(np.array(positions), np.array(energies), record.frames)
+
+
+def _loop(
+    model: ClothModel, options: ClothOptions, frames: Iterator[tuple[Floats, float]], record: ElongationRecord
+) -> ClothFrames:
+    """The last round, closed, with the elongations of its steps and of its frames, which are blended at the end."""
+    positions, energies, seam = close_loop(frames, options.num_frames, options.fps)
+    steps = record.frames[-len(positions) :]
+    blended = [measure_elongation(model, x) for x in positions]
+    return ClothFrames(
+        positions, energies, [join_elongations(*each) for each in zip(steps, blended, strict=True)], seam
+    )
 
 
 def _frames(
-    model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int
+    model: ClothModel, driver: ClothDriver, options: ClothOptions, substeps: int, record: ElongationRecord
 ) -> Iterator[tuple[Floats, float]]:
     """Positions (P, 3) and energy of each frame; for a loop, of all rounds."""
     rounds = MAX_ROUNDS if options.loop else 1
@@ -117,6 +130,7 @@ def _frames(
         "fps": options.fps,
         "num_frames": rounds * (options.num_frames - 1) + 1,
         "substeps": substeps,
+        "record": record,
         "warm_up_frames": round(options.warm_up * options.fps),
     }
     return run_solver(model, driver, options, **timing)

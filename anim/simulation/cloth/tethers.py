@@ -28,7 +28,7 @@ def tether_lengths(topology: ClothTopology, x: Floats, pinned: Ints) -> tuple[In
         return np.full((len(x), 1), -1), np.zeros((len(x), 1))
     is_pinned = np.zeros(len(x), bool)
     is_pinned[pinned] = True
-    is_flat = _is_flat(topology, x)
+    is_flat = find_flat_points(topology, x, FLAT_COSINE)
     anchors, lengths = _nearest(_neighborhoods(topology, x, np.ones(len(x), bool), is_flat), x, pinned)
     columns, limits = [anchors], [lengths]
     covered = np.full(len(pinned), np.inf)
@@ -65,15 +65,24 @@ def _neighborhoods(topology: ClothTopology, x: Floats, usable: Bools, is_flat: B
     return coo_array((lengths, (rings.row, rings.col)), shape=(len(x), len(x))).tocsr()
 
 
-def _is_flat(topology: ClothTopology, x: Floats) -> Bools:
-    """True (P,) for points whose faces have nearly one normal."""
-    corners = x[topology.faces]
-    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    points, repeated = topology.faces.ravel(), np.repeat(normals, 3, axis=0)
-    mean = _unit(np.stack([np.bincount(points, repeated[:, c], minlength=len(x)) for c in range(3)], axis=1))
+def find_flat_points(topology: ClothTopology, x: Floats, cosine: float) -> Bools:
+    """Return True (P,) for points whose faces have nearly one normal. cosine: the least, to their mean."""
+    points, repeated = topology.faces.ravel(), np.repeat(_face_normals(topology, x), 3, axis=0)
+    mean = point_normals(topology, x)
     is_flat = np.ones(len(x), bool)
-    is_flat[points[(repeated * mean[points]).sum(axis=1) < FLAT_COSINE]] = False
+    is_flat[points[(repeated * mean[points]).sum(axis=1) < cosine]] = False
     return is_flat
+
+
+def point_normals(topology: ClothTopology, x: Floats) -> Floats:
+    """Return the unit normals (P, 3) of points, means of their faces'; 0 for points without faces."""
+    points, repeated = topology.faces.ravel(), np.repeat(_face_normals(topology, x), 3, axis=0)
+    return _unit(np.stack([np.bincount(points, repeated[:, c], minlength=len(x)) for c in range(3)], axis=1))
+
+
+def _face_normals(topology: ClothTopology, x: Floats) -> Floats:
+    corners = x[topology.faces]
+    return _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
 def _unit(vectors: Floats) -> Floats:

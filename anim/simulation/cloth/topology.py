@@ -44,7 +44,8 @@ def build_topology(positions: Floats, faces: Ints, tolerance: float) -> ClothTop
         raise NotFoundError("the mesh has no edges: cloth needs triangles")
     edges, hinges = _edges_and_hinges(welded)
     count = len(first)
-    return ClothTopology(points, first[order], welded, _color_order(edges, count), _color_order(hinges, count))
+    edges, hinges = edges[color_order(edges, count)], hinges[color_order(hinges, count)]
+    return ClothTopology(points, first[order], welded, np.ascontiguousarray(edges), np.ascontiguousarray(hinges))
 
 
 def _edges_and_hinges(faces: Ints) -> tuple[Ints, Ints]:
@@ -60,8 +61,8 @@ def _edges_and_hinges(faces: Ints) -> tuple[Ints, Ints]:
     return sides[is_first], hinges[hinges[:, 0] != hinges[:, 1]]
 
 
-def _color_order(pairs: Ints, count: int) -> Ints:
-    """Pairs (E, 2) ordered by greedy colors, those that share no point together; stable."""
+def color_order(pairs: Ints, count: int) -> Ints:
+    """Return the order (E,) of pairs (E, 2) of `count` points by greedy colors: those of a color share no point."""
     used, colors = [0] * count, np.empty(len(pairs), np.int64)
     for k, (i, j) in enumerate(pairs.tolist()):
         taken, color = used[i] | used[j], 0
@@ -70,4 +71,4 @@ def _color_order(pairs: Ints, count: int) -> Ints:
         colors[k] = color
         used[i] |= 1 << color
         used[j] |= 1 << color
-    return np.ascontiguousarray(pairs[np.argsort(colors, kind="stable")])
+    return np.argsort(colors, kind="stable")

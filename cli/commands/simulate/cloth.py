@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any
@@ -39,6 +40,7 @@ from cli.workflows.simulation_report import check_report, write_report
 
 Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
 XPBD, MASS_SPRING = Solver("xpbd"), Solver("mass-spring")
+MIN_STATED_STRETCH = 0.05  # beyond, its cause is stated
 SELECTOR = "x-min … z-max, joint:GLOB, weight:GLOB,MIN, material:GLOB or box:X,Y,Z,SX,SY,SZ"
 
 
@@ -196,7 +198,9 @@ def command(
         voice.info(f"note: {note}")
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
-    voice.info(f"{name}  {text.format_bytes(saved.size)}, {_summary(run)}, {took}{' (dry run)' if dry_run else ''}")
+    voice.info(
+        f"{name}  {text.format_bytes(saved.size)}, {_summary(run, substeps)}, {took}{' (dry run)' if dry_run else ''}"
+    )
     if run.report.advice:
         voice.warn(run.report.advice)
 
@@ -213,19 +217,31 @@ def _as_part(cache: VertexCache, scene: Scene, node: int) -> VertexCache:
     return replace(cache, parts=tuple(parts))
 
 
-def _summary(run: ClothRun) -> str:
+def _summary(run: ClothRun, substeps: int) -> str:
     figures: dict[str, Any] = dict(run.report.figures)
-    worst = run.report.worst_stretch or {"fraction": 0.0, "time_s": 0.0, "at_end": 0.0}
+    worst = run.report.worst_stretch or {}
+    chosen = " (chosen for --max-stretch)" if figures["substeps"] != substeps else ""
     parts = [
         f"{text.plural(run.cache.frame_count, 'frame')} of {figures['points']} points ({figures['pinned']} pinned)",
-        f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s",
-        f"stretched by {format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s",
+        f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s{chosen}",
+        _stretch(worst),
     ]
     if run.report.penetration_m:
         parts.append(f"{text.format_length(run.report.penetration_m)} inside a collider or below the floor at most")
     if run.report.loop_seam_m is not None:
         parts.append(_loop(figures["loop_rounds"], run.report.loop_seam_m, settled=figures["loop_settled"]))
     return ", ".join(parts)
+
+
+def _stretch(worst: Mapping[str, Any]) -> str:
+    """The largest elongation and its cause, and apart that of edges without pinned ends if others are longer."""
+    cause = ", by the clip's first pose" if worst["time_s"] == 0 and worst["fraction"] > MIN_STATED_STRETCH else ""
+    words = f"stretched by {format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s{cause}"
+    if worst["attached_edges"] > max(2 * worst["free_edges"], MIN_STATED_STRETCH):
+        words += f" (edges without pinned ends by {format_number(100 * worst['free_edges'], 2)} %"
+        forced = worst["attachment"] if worst["attachment"] > MIN_STATED_STRETCH else 0.0
+        words += f"; the clip moves pinned ends apart by {format_number(100 * forced, 2)} %)" if forced else ")"
+    return words
 
 
 def _loop(rounds: int, seam: float, *, settled: bool) -> str:

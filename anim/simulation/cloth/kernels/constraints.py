@@ -1,4 +1,4 @@
-"""Constraints of cloth: distances of points, compliant or limited, and distances to pinned points.
+"""Constraints of cloth: distances of points, compliant or limited, and distances to distant and pinned points.
 
 Sources: Macklin, Müller, Chentanez, XPBD, 2016; Provot, Deformation Constraints, 1995, for limits of elongation; Kim,
 Chentanez, Müller-Fischer, Long Range Attachments, 2012, for tethers.
@@ -70,6 +70,25 @@ def limit_elongation(
 
 
 @jit
+def shorten_pairs(p: Floats, w: Floats, pairs: Ints, most: Floats, first: int, end: int) -> None:
+    """Move pairs first … end − 1 of (D, 2) together that are farther apart than their limits (D,) m, in order."""
+    for k in range(first, end):
+        i, j = pairs[k, 0], pairs[k, 1]
+        dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
+        square = dx * dx + dy * dy + dz * dz
+        if square <= most[k] * most[k]:
+            continue
+        length = np.sqrt(square)
+        s = (most[k] - length) / ((w[i] + w[j]) * length)
+        p[i, 0] += s * w[i] * dx
+        p[i, 1] += s * w[i] * dy
+        p[i, 2] += s * w[i] * dz
+        p[j, 0] -= s * w[j] * dx
+        p[j, 1] -= s * w[j] * dy
+        p[j, 2] -= s * w[j] * dz
+
+
+@jit
 def limit_tethers(p: Floats, w: Floats, anchors: Ints, limits: Floats) -> None:
     """Pull points back that are farther from one of their anchors (P, K) than its limit (P, K) m; −1 for none."""
     for i in range(len(p)):
@@ -89,22 +108,21 @@ def limit_tethers(p: Floats, w: Floats, anchors: Ints, limits: Floats) -> None:
 
 
 @jit
-def find_longest(frames: Floats, w: Floats, pairs: Ints, rest: Floats, longest: Ints, elongation: Floats) -> None:
-    """Fill the index (F,) and the relative elongation (F,) of the pair that is stretched most in frames (F, P, 3).
+def find_longest(p: Floats, w: Floats, pairs: Ints, rest: Floats, longest: Ints, elongation: Floats) -> None:
+    """Fill the index (2,) and the relative elongation (2,) of the free and the attached pair that is stretched most.
 
-    Pairs without a free end are left out.
+    Free pairs have two free ends, attached ones a pinned end. Pairs of pinned points (P, 3) are left out; −1 for none.
     """
-    for f in range(len(frames)):
-        elongation[f], longest[f] = -1.0, 0
-        for k in range(len(pairs)):
-            i, j = pairs[k, 0], pairs[k, 1]
-            if w[i] + w[j] == 0.0:
-                continue
-            dx, dy, dz = (
-                frames[f, i, 0] - frames[f, j, 0],
-                frames[f, i, 1] - frames[f, j, 1],
-                frames[f, i, 2] - frames[f, j, 2],
-            )
-            change = np.sqrt(dx * dx + dy * dy + dz * dz) / rest[k] - 1.0
-            if change > elongation[f]:
-                elongation[f], longest[f] = change, k
+    square = np.zeros(2)
+    longest[:] = 0
+    for k in range(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if w[i] + w[j] == 0.0:
+            continue
+        kind = 0 if w[i] > 0.0 and w[j] > 0.0 else 1
+        dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
+        found, length = dx * dx + dy * dy + dz * dz, rest[k] * rest[k]
+        if found > square[kind] * length:
+            square[kind], longest[kind] = found / length, k
+    for kind in range(2):
+        elongation[kind] = np.sqrt(square[kind]) - 1.0

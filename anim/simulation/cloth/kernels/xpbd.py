@@ -10,10 +10,18 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.simulation.cloth.kernels.collisions import push_out
-from anim.simulation.cloth.kernels.constraints import limit_elongation, limit_tethers, project_distances
+from anim.simulation.cloth.kernels.constraints import (
+    find_longest,
+    limit_elongation,
+    limit_tethers,
+    project_distances,
+    shorten_pairs,
+)
 from anim.simulation.cloth.kernels.self_collision import separate_points
 from anim.simulation.cloth.kernels.wind import add_wind
 from anim.skinning.kernels.jit import jit
+
+REPEATED_LEVELS = 2  # finest levels of distant pairs, in every sweep of the limits
 
 
 @jit
@@ -29,6 +37,9 @@ def step_frame(
     hinge_lengths: Floats,
     anchors: Ints,
     limits: Floats,
+    distant: Ints,
+    distances: Floats,
+    levels: Ints,
     outward: Ints,
     most: Floats,
     order: Ints,
@@ -39,15 +50,19 @@ def step_frame(
     numbers: Floats,
     iterations: int,
     limit_sweeps: int,
+    longest: Ints,
+    elongation: Floats,
 ) -> float:
     """Advance positions and velocities (P, 3) in place by S substeps; return the elastic energy in J at their end.
 
-    pinned: (N,) indices of points that go to targets (S, N, 3). anchors, limits: (P, K), see `limit_tethers`. outward:
-    (E, 2) edges in another order, most: their longest lengths, order: see `limit_elongation`. colliders: (S + 1, C, 8),
-    from the end of the step before, see `push_out`. wind: (S, 3) m/s. at_rest: (P, 3), for pairs that self-collision
+    pinned: (N,) indices of points that go to targets (S, N, 3). anchors, limits: (P, K), see `limit_tethers`.
+    distant: (D, 2) pairs and their longest distances (D,), on levels that begin at `levels` (L + 1,). outward: (E, 2)
+    edges in another order, most: their longest lengths, order: see `limit_elongation`. colliders: (S + 1, C, 8), from
+    the end of the step before, see `push_out`. wind: (S, 3) m/s. at_rest: (P, 3), for pairs that self-collision
     leaves alone. numbers: substep s, gravity x, y, z m/s², compliance of edges and of hinges m/N, damping 1/s, density
     of air kg/m³, floor m, thickness m, friction, self-collision thickness m or 0. iterations: of the constraints in
-    each substep. limit_sweeps: at most so many of `limit_elongation`, until no edge is too long.
+    each substep. limit_sweeps: at most so many of `limit_elongation`, until no edge is too long. longest, elongation:
+    (S, 2), filled with `find_longest` at the end of each substep.
     """
     h, damping, air = numbers[0], numbers[6], numbers[7]
     floor, thickness, friction, own = numbers[8], numbers[9], numbers[10], numbers[11]
@@ -72,11 +87,14 @@ def step_frame(
         for k in range(len(pinned)):
             for c in range(3):
                 p[pinned[k], c] = targets[s, k, c]
+        push_out(p, old, w, colliders[s + 1], colliders[s], floor, thickness, friction)  # and again at the end
+        limit_tethers(p, w, anchors, limits)
+        shorten_pairs(p, w, distant, distances, 0, len(distant))
         for _ in range(iterations):
             project_distances(p, w, edges, edge_lengths, stretch, edge_multipliers)
             project_distances(p, w, hinges, hinge_lengths, bend, hinge_multipliers)
-        limit_tethers(p, w, anchors, limits)
         for _ in range(limit_sweeps):
+            shorten_pairs(p, w, distant, distances, levels[-1 - min(REPEATED_LEVELS, len(levels) - 1)], len(distant))
             if not limit_elongation(p, w, outward, most, order, stretch, edge_multipliers):
                 break
         if own > 0.0 and s % 2 == 0:
@@ -85,6 +103,7 @@ def step_frame(
         for i in range(len(p)):
             for c in range(3):
                 v[i, c] = (p[i, c] - old[i, c]) / h
+        find_longest(p, w, edges, edge_lengths, longest[s], elongation[s])
     energy = 0.0
     for k in range(len(edges)):  # ½ compliance · force², and the force is the multiplier / h²
         energy += 0.5 * stretch * edge_multipliers[k] * edge_multipliers[k] / (h * h)
