@@ -78,7 +78,7 @@ PUBLIC = {
     "gltf.reading": "accessors materials meshes reader vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets hierarchy rules schema",
     "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
-    "measure.compare": "diff name_matching",
+    "measure.compare": "diff name_matching vertex_distance",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "largest_error prover",
     "measure.error": "error_curve metric point_matrix shell_points statistics surface",

@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
@@ -31,16 +32,21 @@ from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
 from cli.options import common
 from cli.options.common import Format
-from cli.reports import diff_report
+from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
+from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length, plural
+from cli.workflows.vertex_diff import diff_by_vertex, is_cache
+from cli.workflows.vertex_motion import is_bake_of, pages_of
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
 SPEC = Player("spec")
 
 
 def command(
-    old: Annotated[str, typer.Argument(metavar="A", help="A .glb or .gltf file, '-' for stdin.", show_default=False)],
+    old: Annotated[
+        str, typer.Argument(metavar="A", help="A .glb or .gltf file, or a cache; '-' for stdin.", show_default=False)
+    ],
     new: Annotated[
         str | None,
         typer.Argument(metavar="[B]", help="File to compare with; none with --players.", show_default=False),
@@ -91,6 +97,9 @@ def command(
     rotation error of a node in world space; the largest error of speed (jitter), of morph weights, and of pointers (as
     a fraction of their range); end times that differ; the number of tracks that only A (−) or only B (+) has.
 
+    A bake with its source, and caches (.npz, .pc2, .usdc …), are compared by vertex: B has the vertices of A in their
+    order, in world space; if A has several clips, --clip selects one.
+
     --fail-above also fails if B lacks a clip, and if there is no clip to compare. --player interpolates as other
     players do, which differs for keys that are not of unit length. --players spec,nlerp compares one file in two
     players.
@@ -102,8 +111,19 @@ def command(
     if fps <= 0:
         raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
     kind = "" if plot is None else _kind(plot)
-    one = _opened(old, voice)
-    other = one if new is None else _opened(new, voice)
+    one = other = None
+    if not (is_cache(old) or is_cache(new)):
+        one = _opened(old, voice)
+        other = one if new is None else _opened(new, voice)
+    if new is not None and (one is None or other is None or _are_bake_and_source(one, other)):
+        if plot is not None or player is not SPEC:
+            raise UsageError(f"{'--plot' if plot is not None else '--player'} does not apply to caches and bakes")
+        opened = {side.file.name: (side.document, side.file.size) for side in (one, other) if side is not None}
+        found_by_vertex = diff_by_vertex(old, new, clip or (), fps, voice, opened=opened)
+        _by_vertex(found_by_vertex, format, fail_above, voice, quiet=quiet)
+        return
+    assert one is not None
+    assert other is not None
     scale = diagonal(one.scene)
     limit = None if fail_above is None else _length(fail_above, "--fail-above", scale)
     radius = _length(shell, "--shell", scale)
@@ -127,6 +147,23 @@ def command(
         voice.info(f"{plot}  {format_bytes(len(drawn))}")
     if limit is not None:
         _check(report, limit)
+
+
+def _are_bake_and_source(one: _Side, other: _Side) -> bool:
+    is_book = one.is_flipbook or other.is_flipbook
+    return is_book or is_bake_of(one.scene, other.scene) or is_bake_of(other.scene, one.scene)
+
+
+def _by_vertex(report: VertexReport, format: Format, fail_above: str | None, voice: Reporter, *, quiet: bool) -> None:
+    """Write the report of caches and bakes, and check the limit."""
+    if format is Format.JSON:
+        documents.write_text(vertex_report.as_json(report, warnings=voice.warnings))
+    elif not quiet:
+        documents.write_text(vertex_report.text(report))
+    limit = None if fail_above is None else _length(fail_above, "--fail-above", report.found.diagonal)
+    if limit is not None and report.found.max_error > limit:
+        worst = f"{format_length(report.found.max_error)} at vertex {report.vertex}, {report.found.time:.3f} s"
+        raise CheckError(f"{report.names[1]}: {worst} (limit {format_length(limit)})")
 
 
 def _length(text: str, option: str, scale: float) -> float:
@@ -155,6 +192,12 @@ class _Side:
     file: File
     clips: tuple[Clip, ...]
     scene: Scene
+    document: Document
+
+    @property
+    def is_flipbook(self) -> bool:
+        """Return whether the frames are pages."""
+        return pages_of(self.document) is not None
 
 
 def _opened(path: str, voice: Reporter) -> _Side:
@@ -166,7 +209,7 @@ def _opened(path: str, voice: Reporter) -> _Side:
         if scene.instances and reader.is_default_scene_empty(document):
             voice.warn(f"{source.name}: the default scene has no mesh, most players show nothing")
         cost = StorageCost(stored_bytes(document), storage_costs(document)[1].json)
-        return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene)
+        return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene, document)
 
 
 def _names(one: _Side, other: _Side) -> tuple[int, bool]:

@@ -15,9 +15,9 @@ import numpy as np
 
 from anim.arrays import AnyArray, Ints
 from anim.caches.source_document.bake_source import BakedMesh, baked_meshes
-from anim.caches.source_document.lit_meshes import UNLIT
+from anim.caches.source_document.lit_meshes import UNLIT, find_item
 from anim.errors import FormatError
-from anim.gltf.document import Document, Json, json_array
+from anim.gltf.document import Document, Json
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import DEFAULT_ALPHA_CUTOFF, TRANSFORM, image_data
 from anim.model import VertexCache
@@ -63,7 +63,7 @@ class UsdMaterials:
         """Define material `number` of the document, and return it."""
         from pxr import Sdf, UsdShade
 
-        about = json_array(self._document.json, "materials")[number]
+        about = find_item(self._document.json, "materials", number)
         path = Sdf.Path(f"{self._scope}/material{number}")
         material = UsdShade.Material.Define(self._stage, path)
         if about.get("name"):
@@ -84,8 +84,8 @@ class UsdMaterials:
     def note_losses(self, primitives: Iterable[Json]) -> None:
         """Note vertex colors and scales of normal maps, which UsdPreviewSurface does not have."""
         listed = list(primitives)
-        used = {each["material"] for each in listed if type(each.get("material")) is int}
-        normals = [json_array(self._document.json, "materials")[i].get("normalTexture", {}) for i in used]
+        used = [find_item(self._document.json, "materials", each.get("material")) for each in listed]
+        normals = [each.get("normalTexture", {}) for each in used]
         if any("COLOR_0" in each["attributes"] for each in listed):
             self._note("vertex colors are left out: UsdPreviewSurface does not have them")
         if any(each.get("scale", 1.0) != 1.0 for each in normals):
@@ -138,17 +138,20 @@ class UsdMaterials:
         return node
 
     def _wrap(self, info: Json) -> tuple[str, str]:
-        texture = self._document.json["textures"][info["index"]]
-        sampler = self._document.json["samplers"][texture["sampler"]] if "sampler" in texture else {}
+        texture = find_item(self._document.json, "textures", info.get("index"))
+        sampler = find_item(self._document.json, "samplers", texture.get("sampler"))
         return WRAP.get(sampler.get("wrapS", 0), "repeat"), WRAP.get(sampler.get("wrapT", 0), "repeat")
 
     def _image(self, info: Json, material: int) -> str:
         """Path of the file of a texture's image; "" with a note if USD can't show it."""
-        source: int | None = json_array(self._document.json, "textures")[info["index"]].get("source")
+        source: int | None = find_item(self._document.json, "textures", info.get("index")).get("source")
         if source in self._files:
             return self._files[source]
         try:
-            data = b"" if source is None else image_data(self._document, source, self._accessors).tobytes()
+            is_there = find_item(self._document.json, "images", source)
+            data = (
+                b"" if source is None or not is_there else image_data(self._document, source, self._accessors).tobytes()
+            )
             problem = "is neither PNG nor JPEG"
         except FormatError as error:
             data, problem = b"", str(error)
@@ -169,9 +172,9 @@ def bind_materials(cache: VertexCache, document: Document, mesh: Any, materials:
     for number in sorted({number for each, _ in primitives for number in _coordinate_sets(document.json, each)}):
         _add_coordinates(cache, document, mesh, primitives, number)
     used = [each.get("material", -1) for each, _ in primitives]
-    about = json_array(document.json, "materials")
+    about = [find_item(document.json, "materials", number) for number in used]
     materials.note_losses(each for each, _ in primitives)
-    mesh.CreateDoubleSidedAttr(any(number >= 0 and about[number].get("doubleSided", False) for number in used))
+    mesh.CreateDoubleSidedAttr(any(each.get("doubleSided", False) for each in about))
     starts = np.array([span[0] for _, span in primitives])
     owner: Ints = np.searchsorted(starts, cache.faces[:, 0], side="right") - 1
     of_face = np.array(used)[owner] if len(owner) else np.empty(0, np.int64)
@@ -213,8 +216,7 @@ def _primitives(document: Document, meshes: Sequence[BakedMesh]) -> Iterator[tup
 
 def _coordinate_sets(json: Json, primitive: Json) -> set[int]:
     """Sets of texture coordinates that a primitive's material uses, and the first one."""
-    number = primitive.get("material")
-    infos = [each.info for each in _textures(json["materials"][number])] if type(number) is int else []
+    infos = [each.info for each in _textures(find_item(json, "materials", primitive.get("material")))]
     wanted = {0, *map(_coordinate_set, infos)}
     return {each for each in wanted if f"TEXCOORD_{each}" in primitive["attributes"]}
 

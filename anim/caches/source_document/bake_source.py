@@ -10,6 +10,7 @@ from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading.reader import depth_first
 from anim.model import MeshPart, VertexCache
 
+BAKED_SUFFIX = " (baked)"  # of the names of new nodes
 Span = tuple[int, int]  # of vertices: first, last + 1
 
 
@@ -102,4 +103,4 @@ def _is_morphed(json: Json, node: int) -> bool:
 
 def baked_name(json: Json, node: int) -> str:
     """Return the name of a new node with the baked mesh of a node."""
-    return f"{json['nodes'][node].get('name') or node_label(json, node)} (baked)"
+    return f"{json['nodes'][node].get('name') or node_label(json, node)}{BAKED_SUFFIX}"

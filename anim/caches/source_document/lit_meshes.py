@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from anim.gltf.document import Json, json_array
 
 UNLIT = "KHR_materials_unlit"
 
 
+def find_item(json: Json, key: str, index: object) -> Json:
+    """Return an object of a top-level array, {} for an index that the file does not have."""
+    found = json_array(json, key)
+    item = found[index] if type(index) is int and 0 <= index < len(found) else {}
+    return item if isinstance(item, dict) else {}
+
+
 def has_lit_normals(json: Json, nodes: Iterable[int]) -> bool:
     """Return whether a mesh on the nodes has normals and a material that they shade."""
-    materials = json_array(json, "materials")
-    for node in nodes:
-        for primitive in json["meshes"][json["nodes"][node]["mesh"]]["primitives"]:
-            number = primitive.get("material")
-            material = materials[number] if type(number) is int else {}
-            if "NORMAL" in primitive["attributes"] and UNLIT not in material.get("extensions", {}):
-                return True
-    return False
+    return any(
+        "NORMAL" in each["attributes"]
+        and UNLIT not in find_item(json, "materials", each.get("material")).get("extensions", {})
+        for each in _primitives(json, nodes)
+    )
 
 
 def has_mapped_tangents(json: Json, nodes: Iterable[int]) -> bool:
     """Return whether all primitives on the nodes have tangents, and one of them a normal map."""
-    materials = json_array(json, "materials")
-    primitives = [each for node in nodes for each in json["meshes"][json["nodes"][node]["mesh"]]["primitives"]]
-    used = {each["material"] for each in primitives if type(each.get("material")) is int}
-    is_mapped = any("normalTexture" in materials[number] for number in used)
-    return is_mapped and all("TANGENT" in each["attributes"] for each in primitives)
+    found = list(_primitives(json, nodes))
+    is_mapped = any("normalTexture" in find_item(json, "materials", each.get("material")) for each in found)
+    return is_mapped and all("TANGENT" in each["attributes"] for each in found)
+
+
+def _primitives(json: Json, nodes: Iterable[int]) -> Iterator[Json]:
+    for node in nodes:
+        yield from json["meshes"][json["nodes"][node]["mesh"]]["primitives"]

@@ -35,6 +35,7 @@ def test_the_table_says_who_holds_them() -> None:
         ".npz",
         ".usdc",
         ".usda",
+        ".usdz",
         ".glb",
     }
 

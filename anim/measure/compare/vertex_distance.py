@@ -1,0 +1,53 @@
+"""Distances between corresponding vertices of two motions, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.errors import ShapeError
+
+MAX_SAMPLES = 16_000_000  # maximum number of vertices × frames for p99
+
+
+@dataclass(frozen=True, slots=True)
+class VertexDistance:
+    """Distances in m. max_error at vertex and time (s); mean over all vertices and frames, p99 over up to MAX_SAMPLES.
+
+    diagonal: of the first motion's bounding box. frames: number of compared times.
+    """
+
+    max_error: float
+    time: float
+    vertex: int
+    mean: float
+    p99: float
+    diagonal: float
+    frames: int
+
+
+def vertex_distance(times: Floats, old: Iterable[AnyArray], new: Iterable[AnyArray]) -> VertexDistance:
+    """Return the distances of frames (V, 3) of two motions at `times` (F,). Raises ShapeError for other vertex counts.
+
+    The frames are read once, one at a time.
+    """
+    worst, time, vertex, total, count = 0.0, float(times[0]), -1, 0.0, 0
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    samples: list[AnyArray] = []
+    for at, first, second in zip(times.tolist(), old, new, strict=True):
+        if first.shape != second.shape:
+            raise ShapeError(f"{len(first)} vertices and {len(second)} (expected the same)")
+        distance = np.linalg.norm(first.astype(np.float64) - second, axis=1)
+        far = int(distance.argmax())
+        if distance[far] > worst:
+            worst, time, vertex = float(distance[far]), at, far
+        total, count = total + float(distance.sum()), count + len(distance)
+        low, high = np.minimum(low, first.min(axis=0)), np.maximum(high, first.max(axis=0))
+        step = max(1, len(times) * len(distance) // MAX_SAMPLES)
+        samples.append(distance[::step].astype(np.float32))
+    p99 = float(np.percentile(np.concatenate(samples), 99)) if samples else 0.0
+    diagonal = float(np.linalg.norm(high - low))
+    return VertexDistance(worst, time, vertex, total / max(count, 1), min(p99, worst), diagonal, len(samples))

@@ -1,0 +1,115 @@
+"""`diff` by vertex, where one of the two files is a cache, or a bake of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import PurePath
+
+from anim.caches.options import ReadOptions
+from anim.caches.registry import CACHE_FORMATS
+from anim.gltf.document import Document
+from anim.gltf.reading import reader
+from anim.measure.compare.vertex_distance import vertex_distance
+from anim.model import Clip, VertexCache
+from anim.operations.selection import Selection
+from cli.errors import UsageError
+from cli.io import cache_files, documents
+from cli.reports.vertex_report import VertexReport
+from cli.text import Reporter
+from cli.workflows import vertex_motion
+from cli.workflows.vertex_motion import VertexMotion, cache_motion, common_times, pair_documents, pair_with_cache
+
+GLTF = (".glb", ".gltf")
+Opened = Mapping[str, tuple[Document, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """An input: its document or its cache."""
+
+    name: str
+    size: int
+    document: Document | None
+    cache: VertexCache | None
+
+
+def is_cache(path: str | None) -> bool:
+    """Return whether a path has the file extension of a cache that is no glTF."""
+    ending = PurePath(path or "").suffix.lower()
+    return ending in CACHE_FORMATS and ending not in GLTF
+
+
+def diff_by_vertex(
+    old: str, new: str, clips: Sequence[str], fps: float, voice: Reporter, *, opened: Opened
+) -> VertexReport:
+    """Compare two files by vertex, at all keys and frames of both, half-way between, and at `fps` per second.
+
+    clips: globs for the clip of the glTF file; the cache's by name, or the only one. opened: documents that were read
+    already, with their sizes, by name.
+    """
+    with ExitStack() as stack:
+        one, other = (stack.enter_context(_opened(path, voice, opened)) for path in (old, new))
+        label, first, second = _motions(one, other, clips, voice)
+        times = common_times(first, second, fps)
+        found = vertex_distance(times, first.frames(times), second.frames(times))
+        mesh, vertex = vertex_motion.locate(first if first.labels else second, max(found.vertex, 0))
+        return VertexReport((one.name, other.name), (one.size, other.size), label, found, mesh, vertex, fps)
+
+
+@contextmanager
+def _opened(path: str, voice: Reporter, opened: Opened) -> Iterator[_Side]:
+    if is_cache(path):
+        with cache_files.load(path, ReadOptions()) as loaded:
+            for words in loaded.notes:
+                voice.warn(words)
+            yield _Side(loaded.name, loaded.size, None, loaded.cache)
+    elif documents.called(path) in opened:
+        document, size = opened[documents.called(path)]
+        yield _Side(documents.called(path), size, document, vertex_motion.pages_of(document))
+    else:
+        with documents.source(path, voice) as source:
+            cache = vertex_motion.pages_of(source.document)
+            yield _Side(source.name, source.size, source.document, cache)
+
+
+def _motions(one: _Side, other: _Side, globs: Sequence[str], voice: Reporter) -> tuple[str, VertexMotion, VertexMotion]:
+    """Name of the clip, and both motions."""
+    if one.cache is not None and other.cache is not None:
+        return "", cache_motion(one.cache), cache_motion(other.cache)
+    if other.cache is not None and one.document is not None:
+        clip = _clip(one, one.document, globs)
+        return clip.name, *pair_with_cache(one.document, clip, other.cache)
+    if one.cache is not None and other.document is not None:
+        clip = _clip(other, other.document, globs)
+        second, first = pair_with_cache(other.document, clip, one.cache)
+        return clip.name, first, second
+    assert one.document is not None
+    assert other.document is not None
+    if vertex_motion.is_bake_of(reader.scene(one.document), reader.scene(other.document)):
+        return _of_documents((one, one.document), (other, other.document), globs, voice)
+    label, second, first = _of_documents((other, other.document), (one, one.document), globs, voice)
+    return label, first, second
+
+
+def _of_documents(
+    source: tuple[_Side, Document], baked: tuple[_Side, Document], globs: Sequence[str], voice: Reporter
+) -> tuple[str, VertexMotion, VertexMotion]:
+    """Name of the clip, and the motions of a source and of its bake, which has one clip."""
+    (played,) = reader.clips(baked[1])[:1] or (Clip("", ()),)
+    clip = _clip(*source, globs or ([played.name] if played.name in reader.names(source[1]) else []))
+    sides = ((reader.scene(source[1]), clip), (reader.scene(baked[1]), played))
+    first, second, missing = pair_documents(*sides)
+    if missing:
+        voice.warn(f"{baked[0].name}: has no mesh like {', '.join(missing)}")
+    return clip.name, first, second
+
+
+def _clip(side: _Side, document: Document, globs: Sequence[str]) -> Clip:
+    """The selected clip of a document, or its only one."""
+    clips = reader.clips(document)
+    chosen = Selection(globs).chosen_clips(reader.names(document)) if globs else range(len(clips))
+    if len(chosen) > 1:
+        raise UsageError(f"{side.name} has {len(clips)} clips, a cache has one", help="choose one with --clip")
+    return clips[chosen[0]] if chosen else Clip("", ())
