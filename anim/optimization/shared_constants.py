@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,8 @@ class Constants:
 
 def find_constants(context: Context, clips: Sequence[Clip]) -> Constants:
     """Return the constants of all clips; distances use the rest pose's moment arms."""
-    meters = _meters_per_unit(context)
+    animated = {track.node for clip in clips for track in clip.tracks if track.node is not None}
+    meters = _meters_per_unit(context, animated)
     moved: set[Target] = set()
     seen: set[Target] = set()
     values: dict[Target, list[_Value]] = {}
@@ -102,13 +103,13 @@ def _difference(track: Track, value: Floats) -> float:
     return float(apart.max())
 
 
-def _meters_per_unit(context: Context) -> tuple[Floats, Floats, Floats]:
-    """Displacement of a point per unit of each node's translation, rotation and scale (N,), at rest."""
+def _meters_per_unit(context: Context, animated: Iterable[int]) -> tuple[Floats, Floats, Floats]:
+    """Displacement of a point per unit of translation, rotation and scale (N,) of animated nodes, at rest."""
     world, skeleton = context.rest_world, context.skeleton
     places = context.points.places(world[:, None])[:, 0]
     count = len(skeleton)
     reach = np.zeros(count)
-    for node in range(count):
+    for node in animated:
         mine = places[context.points.on(skeleton.descendants(node))]
         reach[node] = np.linalg.norm(mine - world[node, :, 3], axis=1).max(initial=0.0)
     lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max(axis=1)

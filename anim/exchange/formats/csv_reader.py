@@ -28,6 +28,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -152,7 +153,10 @@ def _parse(data: bytes) -> _File:
             elif not file.header:
                 file.header, file.header_line = cells, rows.line_num
                 if len(set(cells)) != len(cells):
-                    raise error_at(rows.line_num, f"column '{next(c for c in cells if cells.count(c) > 1)}' twice")
+                    raise error_at(
+                        rows.line_num,
+                        f"column '{next(name for name, count in Counter(cells).items() if count > 1)}' twice",
+                    )
             else:
                 if len(cells) != len(file.header):
                     raise error_at(

@@ -59,14 +59,15 @@ def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tupl
     ordered: list[NodeBuilder] = []
     numbers: dict[str, int] = {}
     for draft in drafts:
-        chain = [draft]
+        chain, names = [draft], {draft.name}
         while chain[-1].parent is not None and chain[-1].name not in numbers:
             parent = by_name.get(chain[-1].parent)
             if parent is None:
                 raise FormatError(f"node '{chain[-1].name}' has the parent '{chain[-1].parent}', which is not there")
-            if parent in chain:
+            if parent.name in names:
                 raise FormatError(f"node '{parent.name}' is its own ancestor")
             chain.append(parent)
+            names.add(parent.name)
         for each in reversed(chain):
             if each.name not in numbers:
                 numbers[each.name] = len(ordered)

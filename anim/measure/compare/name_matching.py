@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -71,11 +71,12 @@ def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
     different things. match_by_name_then_order(["walk", ""], ["run", "walk"]) → 1, 0
     """
     found = match_by_name(old, new)
-    left = [i for i in range(len(new)) if i not in set(found.tolist())]
+    taken = set(found.tolist())
+    left = deque(i for i in range(len(new)) if i not in taken)
     nothing_found = not (found >= 0).any()
     for i, name in enumerate(old):
         if found[i] < 0 and left and (nothing_found or not name or not new[left[0]]):
-            found[i] = left.pop(0)
+            found[i] = left.popleft()
     return found
 
 

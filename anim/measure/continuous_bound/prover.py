@@ -48,13 +48,13 @@ class Prover:
 
     def __init__(self, ruler: ErrorMetric) -> None:
         self.ruler = ruler
-        found = [(part, influence_radius(part)) for part in ruler.parts if len(part.groups)]
-        plain = [(part, each) for part, each in found if each is not None and each.morphing is None]
-        others = [(part, each) for part, each in found if each is not None and each.morphing is not None]
+        found = [(i, influence_radius(part)) for i, part in enumerate(ruler.parts) if len(part.groups)]
+        plain = [(i, each) for i, each in found if each is not None and each.morphing is None]
+        others = [(i, each) for i, each in found if each is not None and each.morphing is not None]
         self._reaches = [join_reaches([each for _, each in plain])] if plain else []
         self._reaches += [each for _, each in others]
-        self._parts = [part for part, _ in (*plain, *others)]
-        self._order = [ruler.parts.index(part) for part in self._parts]
+        self._order = [i for i, _ in (*plain, *others)]
+        self._parts = [ruler.parts[i] for i in self._order]
         a, b = ruler.scene.skeleton, ruler.other.skeleton
         same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
         self._knows_all = same and len(self._parts) == len(found)

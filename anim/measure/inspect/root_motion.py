@@ -67,13 +67,11 @@ def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
         return frozenset(above)
     scenes = json.get("scenes", ())
     tops = scenes[json.get("scene", 0)].get("nodes", ()) if scenes else ()
-    found, waiting = set(tops), list(tops)
-    nodes = json.get("nodes", ())
-    while waiting:
-        below = [child for child in nodes[waiting.pop()].get("children", ()) if child not in found]
-        found.update(below)
-        waiting += below
-    return frozenset(found or range(len(skeleton)))
+    found = np.zeros(len(skeleton) + 1, bool)  # the last one for roots, whose parent is −1
+    found[list(tops)] = True
+    for level in skeleton.levels():
+        found[level] |= found[skeleton.parents[level]]
+    return frozenset(np.flatnonzero(found).tolist() or range(len(skeleton)))
 
 
 def root_motion_node(skeleton: Skeleton, clip: Clip) -> int:
