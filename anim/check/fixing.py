@@ -11,7 +11,7 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence
 from anim.check.rule import Rule
 from anim.check.selection import RuleSelection
-from anim.errors import AnimError
+from anim.errors import AnimError, UnsupportedError
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.measure.continuous_bound.largest_error import largest_error
@@ -92,16 +92,14 @@ class _Fixer:
         return self.file.document is not before
 
     def _rules(self) -> Iterator[Rule]:
-        rules = self.selection.rules()
-        codes = {rule.code for rule in rules}
-        for rule in rules:
-            if rule.fix is None or rule.code in self.refused or not codes.isdisjoint(rule.fix.yields_to):
-                continue
-            if rule.fix.is_safe or self.unsafe:
+        for rule in self.selection.rules():
+            if rule.fix is not None and rule.code not in self.refused and (rule.fix.is_safe or self.unsafe):
                 yield rule
 
     def _apply(self, rule: Rule, found: list[Occurrence]) -> None:
         assert rule.fix is not None
+        if others := rule.fix.yields_to & {each.code for each in self.selection.rules()}:
+            raise UnsupportedError(f"that would undo the fix of {', '.join(sorted(others))}")
         document = rule.fix.apply(self.file, found, self.selection.values(rule))
         if document is self.file.document:
             return
