@@ -12,6 +12,7 @@ from anim import __version__
 from anim.check.baseline import fingerprint
 from anim.check.finding import Finding, Severity
 from anim.check.registry import RULES
+from anim.check.rules.invalid import RULE as INVALID
 from cli.reports import json_report
 from cli.reports.check_report import CheckReport, summary
 from cli.tables import escape_control
@@ -24,9 +25,9 @@ SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 def as_github(report: CheckReport) -> str:
     """Return workflow commands: at most ten of a severity, as GitHub shows no more, the last with the number left."""
-    lines = [f"::error file={_property(path)}::{_data(str(error))}" for path, error in report.refused]
+    lines = []
     for severity, command in COMMANDS.items():
-        groups = list(_by_rule_and_file(report, severity))
+        groups = [*(_unreadable(report) if severity is Severity.ERROR else ()), *_by_rule_and_file(report, severity)]
         shown = groups if len(groups) <= MAX_ANNOTATIONS else groups[: MAX_ANNOTATIONS - 1]
         for path, title, message in shown:
             lines.append(f"::{command} file={_property(path)},title={_property(title)}::{_data(message)}")
@@ -34,6 +35,14 @@ def as_github(report: CheckReport) -> str:
             lines.append(f"::{command} title=gltf-anim::{left} more of this severity, see the report of the step")
     lines.append(summary(report))
     return "\n".join(lines) + "\n"
+
+
+def _unreadable(report: CheckReport) -> Iterator[tuple[str, str, str]]:
+    """Path, title and message of unreadable files whose error is no finding, as a baseline knows it."""
+    reported = {path for path, each in report.found if each.code == INVALID.code}
+    for path, error in report.refused:
+        if path not in reported:
+            yield path, "unreadable", escape_control(str(error))
 
 
 def _by_rule_and_file(report: CheckReport, severity: Severity) -> Iterator[tuple[str, str, str]]:

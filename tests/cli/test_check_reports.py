@@ -29,6 +29,21 @@ def test_github_shows_ten_of_a_severity_and_escapes_names(folder: Path, call: Ca
     assert "4 more" in notices[-1]
 
 
+def test_github_shows_ten_errors_also_of_unreadable_files(folder: Path, call: Call) -> None:
+    for i in range(12):
+        (folder / f"{i}.glb").write_bytes(b"no glTF")
+    lines = call("check", ".", "--format", "github").text.splitlines()
+    errors = [line for line in lines if line.startswith("::error")]
+    assert len(errors) == 10
+    assert errors[0].startswith("::error file=0.glb,title=GA010 invalid::")
+    assert errors[-1] == "::error title=gltf-anim::3 more of this severity, see the report of the step"
+    call("check", ".", "--write-baseline", "known.json")
+    lines = call("check", ".", "--format", "github", "--baseline", "known.json").text.splitlines()
+    errors = [line for line in lines if line.startswith("::error")]
+    assert errors[0].startswith("::error file=0.glb,title=unreadable::is ")
+    assert len(errors) == 10
+
+
 def test_sarif_has_a_region_and_an_encoded_path_in_every_result(folder: Path, call: Call) -> None:
     (folder / "a b#.glb").write_bytes(built("noop"))
     run = call("check", "a b#.glb", "--format", "sarif").json["runs"][0]
