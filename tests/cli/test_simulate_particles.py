@@ -241,6 +241,11 @@ def test_threads_change_no_byte(fixture: Fixture, call: Call, tmp_path: Path, mo
         (("--max-error", "0mm"), 2, "--max-error"),
         (("--duration", "0"), 2, "--duration is 0"),
         (("--as", "sprite"), 2, "sprite"),
+        (("--speed", "1e30"), 2, "--speed is 1e+30"),
+        (("--inherit", "-1e30"), 2, "--inherit is -1e+30"),
+        (("--gravity", "0,-1e30,0"), 2, "--gravity is 1e+30 m/s²"),
+        (("--drag", "1e30"), 2, "--drag is 1e+30"),
+        (("--drag", "1", "--turbulence", "1e30"), 2, "--turbulence is 1e+30"),
     ],
 )
 def test_options_without_sense_are_refused_in_one_line(

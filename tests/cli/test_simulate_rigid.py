@@ -75,6 +75,8 @@ def test_tracks_are_put_into_the_driving_clip(fixture: Fixture, call: Call, tmp_
         ("wall", (*BRICKS, "--velocity", "1,0,0"), 2, "expected GLOB=X,Y,Z"),
         ("wall", (*BRICKS, "--velocity", "brick*=1e9,0,0"), 2, "limit 1e+06"),
         ("wall", (*BRICKS, "--max-error", "x"), 2, "--max-error"),
+        ("wall", (*BRICKS, "--gravity", "0,-1e30,0"), 2, "limit 10000"),
+        ("wall", ("--body", "brick*", "--floor", "1e30"), 2, "--floor is at 1e+30 m (limit 100000)"),
         ("biped", ("--body", "body"), 4, "is skinned"),
         ("biped", ("--body", "left_foot"), 5, "no mesh to collide with"),
     ],
@@ -95,6 +97,8 @@ def test_input_without_sense_is_refused_in_one_line(
     [
         (b'"mass": 2', b'"mass": -2', 3, "mass is -2 kg"),
         (b'"angularVelocity": [0, 0, 0]', b'"angularVelocity": [1e30, 0, 0]', 6, "diverges in step"),
+        (b'"mass": 2', b'"mass": 1e30', 3, "0 is an infinite mass"),
+        (b'"size": [1, 1, 1]', b'"size": [1, 1e20, 1]', 3, "limit 100000 m"),
         (b'"shape": 1', b'"shape": 5', 3, "there is no shape 5"),
     ],
 )

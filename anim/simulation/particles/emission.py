@@ -15,6 +15,7 @@ from anim.skinning.bake import bake
 
 VELOCITY_STEP_S = 1e-3  # half the interval of the difference quotient of an emitter's motion
 MAX_PARTICLES = 1_000_000
+MAX_SPEED_M_S, MAX_INHERITED = 1e4, 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +44,9 @@ class Emitter:
     end: float | None = None
 
     def __post_init__(self) -> None:
-        for name, most in (("rate", np.inf), ("burst", np.inf), ("speed", np.inf), ("spread", np.pi)):
+        for name, most in (("rate", np.inf), ("burst", np.inf), ("speed", MAX_SPEED_M_S), ("spread", np.pi)):
             _check(name, getattr(self, name), 0.0, most)
+        _check("inherit", self.inherit, -MAX_INHERITED, MAX_INHERITED)
         _check("lifetime", self.lifetime, 1e-3, np.inf)
         for name in ("speed_variation", "lifetime_variation"):
             _check(name, getattr(self, name), 0.0, 1.0)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 NUM_MODES = 24  # of the turbulence; more are not seen
 EARTH_GRAVITY_M_S2 = (0.0, -9.81, 0.0)
 
+MAX_ACCELERATION_M_S2, MAX_AIR_SPEED_M_S, MAX_DRAG = 1e4, 1e4, 1e6  # beyond, a number is a mistake
+
 
 @dataclass(frozen=True, slots=True)
 class Forces:
@@ -29,7 +31,7 @@ class Forces:
     gravity: m/s². linear_drag: 1/s. quadratic_drag: 1/m; both act on the velocity relative to the air.
     wind: m/s, velocity of the air. turbulence: m/s, root mean square of its random part, which varies over
     turbulence_size m and as it moves that far. seed: of the turbulence.
-    Raises RangeError for negative values, or for wind without drag, which moves nothing.
+    Raises RangeError for negative or huge values, or for wind without drag, which moves nothing.
     """
 
     gravity: tuple[float, float, float] = EARTH_GRAVITY_M_S2
@@ -45,6 +47,17 @@ class Forces:
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0) or (name == "turbulence_size" and value == 0):
                 raise RangeError(f"`{name}` is {value:g} (expected a number of at least 0)")
+        for name, most, unit in (
+            ("gravity", MAX_ACCELERATION_M_S2, " m/s²"),
+            ("wind", MAX_AIR_SPEED_M_S, " m/s"),
+            ("turbulence", MAX_AIR_SPEED_M_S, " m/s"),
+            ("linear_drag", MAX_DRAG, ""),
+            ("quadratic_drag", MAX_DRAG, ""),
+        ):
+            largest = float(np.abs(getattr(self, name)).max())
+            if largest > most:
+                option = name.removeprefix("linear_")
+                raise RangeError(f"`{option}` is {largest:g}{unit} (limit {most:g})")
         if (any(self.wind) or self.turbulence) and not (self.linear_drag or self.quadratic_drag):
             raise RangeError(
                 "`wind` and `turbulence` act by drag, and drag is 0", help="give a drag, such as 1 per second"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import AnimError, RangeError
+from anim.errors import AnimError, FormatError, RangeError
 from anim.maths import matrix, quaternion
 from anim.model import Clip, Skeleton
 from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription, Shape, Vector
@@ -123,9 +123,9 @@ def _joints(
         ends = (joint.node, joint.connected)
         owners = [_carrier(skeleton, node, description, indices) for node in ends]
         if max(owners) < 0:
-            raise RangeError("a joint connects no body", where=skeleton.label(joint.node))
+            raise FormatError("a joint connects no body", where=skeleton.label(joint.node))
         if owners[0] == owners[1]:
-            raise RangeError("a joint connects a body with itself", where=skeleton.label(joint.node))
+            raise FormatError("a joint connects a body with itself", where=skeleton.label(joint.node))
         own = [frames[owner] if owner >= 0 else Frame(ZERO, IDENTITY) for owner in owners]
         local = [relative_frame(outer, frames[node]) for outer, node in zip(own, ends, strict=True)]
         bodies = [indices[owner] if owner >= 0 else WORLD for owner in owners]

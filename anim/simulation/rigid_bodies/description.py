@@ -15,6 +15,7 @@ Vector = tuple[float, float, float]
 COMBINE_MODES = ("average", "minimum", "maximum", "multiply")  # the first that either material has counts
 WATER_KG_M3 = 1000.0
 MAX_SPEED_M_S = 1e6  # beyond which float32 has no distances
+MAX_SIZE_M, MAX_MASS_KG = 1e5, 1e9  # of the engine's float32; a body of infinite mass has that mass
 NO_POINTS: Floats = np.empty((0, 3))
 NO_FACES: Ints = np.empty((0, 3), np.int64)
 
@@ -37,6 +38,8 @@ class Shape:
     def __post_init__(self) -> None:
         if not all(math.isfinite(value) and value >= 0 for value in self.size) or (self.size and not any(self.size)):
             raise RangeError(f"a {self.kind} has size {list(self.size)} (expected numbers above 0)")
+        if self.size and max(self.size) > MAX_SIZE_M:
+            raise RangeError(f"a {self.kind} has size {list(self.size)} (limit {MAX_SIZE_M:g} m)")
         if self.kind in ("sphere", "box") and not all(self.size):
             raise RangeError(f"a {self.kind} has size {list(self.size)} (expected numbers above 0)")
         if self.kind == "mesh" and not len(self.faces):
@@ -106,6 +109,8 @@ class Motion:
     def __post_init__(self) -> None:
         if self.mass is not None and not self.mass > 0:
             raise RangeError(f"mass is {self.mass:g} kg (expected above 0)")
+        if self.mass is not None and MAX_MASS_KG < self.mass < math.inf:
+            raise RangeError(f"mass is {self.mass:g} kg (limit {MAX_MASS_KG:g}; 0 is an infinite mass)")
         if not (math.isfinite(self.density) and self.density > 0):
             raise RangeError(f"density is {self.density:g} kg/m³ (expected above 0)")
         if self.inertia_diagonal is not None:
@@ -182,13 +187,17 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicsDescription:
-    """Motions and colliders by node, and joints. floor: height of a static plane, None for none."""
+    """Motions and colliders by node, and joints. floor: height of a static plane, None for none. Raises RangeError."""
 
     motions: Mapping[int, Motion] = field(default_factory=dict)
     colliders: Mapping[int, Collider] = field(default_factory=dict)
     joints: tuple[Joint, ...] = ()
     floor: float | None = None
     floor_material: Material = field(default_factory=Material)
+
+    def __post_init__(self) -> None:
+        if self.floor is not None and not abs(self.floor) <= MAX_SIZE_M:
+            raise RangeError(f"`floor` is at {self.floor:g} m (limit {MAX_SIZE_M:g})")
 
 
 def combine(modes: tuple[str, str], first: float, second: float, order: Sequence[str] = COMBINE_MODES) -> float:

@@ -22,6 +22,7 @@ def find_notes(
 ) -> list[str]:
     """Return remarks: overlaps at the start, approximations, animated parents, shear, a loop's seam; empty for none."""
     return [
+        *_without_colliders(rigid, skeleton),
         *_overlaps(rigid, skeleton, motion),
         *_far(rigid, motion),
         *sorted({words for joint in rigid.joints for words in find_approximations(joint)}),
@@ -32,6 +33,16 @@ def find_notes(
         ),
         *_seam(rigid, motion, seam),
     ]
+
+
+def _without_colliders(rigid: RigidScene, skeleton: Skeleton) -> list[str]:
+    own = [rigid.bodies[i] for i in rigid.moving if not rigid.bodies[i].colliders]
+    joined = {i for joint in rigid.joints for i in joint.bodies}
+    free = [each for each in own if rigid.bodies.index(each) not in joined]
+    if not free:
+        return []
+    more = f" and {len(free) - 1} more" if len(free) > 1 else ""
+    return [f"{skeleton.label(free[0].node)}{more}: a body without a collider (triggers are none) touches nothing"]
 
 
 def _overlaps(rigid: RigidScene, skeleton: Skeleton, motion: RigidMotion) -> list[str]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
+from anim.errors import RangeError
+from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2, MAX_ACCELERATION_M_S2
 from anim.simulation.rigid_bodies.description import Vector
 
 SETTLED_M = 1e-4  # largest distance of a body between both ends of a round that counts as none
@@ -16,7 +18,7 @@ class RigidOptions:
 
     max_error: m, of any point of a body's colliders, within which keys are removed; 0 for none.
     loop: repeat the clip until the bodies end as they began; after 20 rounds the last 0.2 s lead back to the start.
-    estimate_error: run again with half the step, which takes twice as long.
+    estimate_error: run again with half the step, which takes twice as long. Raises RangeError for a gravity above 1e4.
     """
 
     gravity: Vector = EARTH_GRAVITY_M_S2
@@ -27,3 +29,7 @@ class RigidOptions:
     max_error: float = 0.0
     loop: bool = False
     estimate_error: bool = False
+
+    def __post_init__(self) -> None:
+        if not math.hypot(*self.gravity) <= MAX_ACCELERATION_M_S2:
+            raise RangeError(f"`gravity` is {list(self.gravity)} m/s² (limit {MAX_ACCELERATION_M_S2:g})")

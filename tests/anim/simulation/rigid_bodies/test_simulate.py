@@ -300,3 +300,9 @@ def test_a_wall_by_globs_is_the_same_bytes_twice() -> None:
     clip = reader.clips(opened(written[0]))[0]
     assert (clip.name, len(clip.tracks), clip.end) == ("fall", 2 * 30, 0.5)
     assert fixtures.FIXTURES["wall"]() == fixtures.build("wall")
+
+
+@pytest.mark.parametrize("physics", [{}, {"trigger": {"geometry": {"shape": 0}}}])
+def test_a_body_without_a_collider_is_noted(physics: dict[str, Any]) -> None:
+    run = simulate(document([node((0, 1, 0), motion={}, **physics)], BALL), duration=0.1)
+    assert run.notes == ["node 0: a body without a collider (triggers are none) touches nothing"]
