@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 import textwrap
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -94,3 +95,16 @@ def test_hooks_call_commands_of_the_table() -> None:
 
 def test_the_script_is_sound_bash() -> None:
     assert subprocess.run(["bash", "-n"], input=script_of_action().encode(), check=False).returncode == 0
+
+
+def test_young_packages_have_upper_bounds() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = [*project["dependencies"], *(each for extra in project["optional-dependencies"].values() for each in extra)]
+    for name in ("meshopt", "rapier3d", "typer"):
+        assert any(line.startswith(name) and "<" in line for line in lines), name
+
+
+def test_ci_runs_the_lowest_and_the_newest_and_audits() -> None:
+    text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    for words in ("--resolution lowest-direct", "--resolution highest", "pip-audit"):
+        assert words in text
