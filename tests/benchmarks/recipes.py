@@ -26,7 +26,7 @@ from tests.cli.running_recipes import variant
 FILE = ROOT.parent / "shared" / "assets" / "Fox.glb"
 RECIPE = """[[recipe]]
 match = "in/*.glb"
-steps = ["resample --fps 30", "optimize --effort fast"]
+steps = ["retime --speed 0.5", "resample --fps 30"]
 out = "out/{name}"
 """
 NUM_SINGLE = 20  # files for single commands

@@ -6,9 +6,13 @@ import json
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
+from cli import main
+from cli.workflows.run.steps import EDITING, MAKING, REFUSED
 from tests.cli.conftest import Call
 from tests.cli.running import built, help_line, refusal
 from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, write_recipe
@@ -262,3 +266,24 @@ def test_steps_show_no_progress_of_their_own(folder: Path, call: Call, monkeypat
     monkeypatch.setattr("cli.progress.UPDATE_INTERVAL_S", 0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert "optimize" not in call("run").err
+
+
+def test_commands_that_make_gltf_from_gltf_are_steps() -> None:
+    group: Any = typer.main.get_command(main.app)
+    making = {name for name in main.COMMANDS if _makes_gltf(group.get_command(None, name))}
+    assert making == {*EDITING, *MAKING}
+
+
+def test_options_of_steps_that_name_files_are_read_or_refused() -> None:
+    group: Any = typer.main.get_command(main.app)
+    commands = [group.get_command(None, name) for name in (*EDITING, *MAKING)]
+    kinds = [each.get_command(None, kind) for each in commands for kind in getattr(each, "table", ())]
+    named = {each.name for command in (*commands, *kinds) for each in command.params if each.metavar == "FILE"}
+    assert named - REFUSED.keys() == {"onto", "alias", "springs"}, "others are written, or a new one is read"
+
+
+def _makes_gltf(command: Any) -> bool:
+    if hasattr(command, "table"):
+        return any(_makes_gltf(command.get_command(None, kind)) for kind in command.table)
+    arguments = [each for each in command.params if each.param_type_name == "argument"]
+    return len(arguments) > 1 and (arguments[1].help or "").startswith("A .glb or .gltf file")

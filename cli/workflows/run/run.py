@@ -51,6 +51,12 @@ class RecipeRun:
             with closing(self._results(self._look_up())) as results:  # ends the workers
                 for job, result in results:
                     self._record(job, result, MADE if result.code == errors.DONE else FAILED)
+        except (KeyboardInterrupt, SystemExit):
+            self._progress.close()
+            self.voice.info(
+                f"ended after {self.counts.total()} of {plural(len(self.jobs), 'file')}: --resume continues"
+            )
+            raise
         finally:
             self._progress.close()
         counts = [f"{self.counts[each]} {each}" for each in STATUSES if self.counts[each]]
