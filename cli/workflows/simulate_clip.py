@@ -88,3 +88,9 @@ def driving_clip(document: Document, glob: str | None) -> int | None:
         more = " …" if len(chosen) > 4 else ""
         raise UsageError(f"--clip '{glob}' names {len(chosen)} clips ({listed}{more}): one drives a simulation")
     return chosen[0]
+
+
+def note_own_clip(name: str, driver: Clip, voice: Reporter) -> None:
+    """Note that the motion is in a clip of its own, which players don't show first."""
+    first = f"clip '{driver.name}'" if driver.name else "the driving clip"
+    voice.info(f"note: the motion is clip '{name}'; players begin with another: --merge adds it to {first}")

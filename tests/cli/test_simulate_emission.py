@@ -91,3 +91,12 @@ def test_input_without_sense_is_refused_in_one_line(
     assert (run.code, out.exists()) == (code, False), run.err
     assert words in run.err
     assert len(run.err.splitlines()) <= 2
+
+
+def test_a_clip_of_its_own_is_noted_with_the_option_that_merges_it(
+    fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    words = "note: the motion is clip 'particles'; players begin with another: --merge adds it to clip 'walk'"
+    args = ("simulate", "particles", fixture("biped"), tmp_path / "out.glb", "--node", "head", "--duration", "0.5")
+    assert words in call(*args).err
+    assert "note: the motion" not in call(*args, "--merge").err

@@ -32,7 +32,7 @@ from cli.progress import announce_compiling
 from cli.text import Reporter
 from cli.workflows.colliders import parse_colliders
 from cli.workflows.particle_options import parse_attractor, parse_box
-from cli.workflows.simulate_clip import simulate_clip
+from cli.workflows.simulate_clip import note_own_clip, simulate_clip
 
 ROUNDING_M = 1e-9
 RIGID_BODIES = "khr"  # a value of --colliders
@@ -232,6 +232,8 @@ def command(
             return encode_points(run.points(), fps, ending), run.report, _summary(run.report, has_nodes=False)
         _check_nodes(run, form, voice, force=force)
         merged = (number, driver) if merge and number is not None else None
+        if number is not None and merged is None:
+            note_own_clip(name, driver, voice)
         return add_particles(document, run, name, merged, form.value), run.report, _summary(run.report)
 
     voice = Reporter(quiet, verbose)

@@ -27,7 +27,7 @@ from cli.errors import UsageError
 from cli.options import common, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.text import Reporter
-from cli.workflows.simulate_clip import simulate_clip
+from cli.workflows.simulate_clip import note_own_clip, simulate_clip
 
 DEFAULT_DURATION_S = 5.0
 ROUNDING_M = 1e-6  # float32 of a body some metres from the center
@@ -113,6 +113,8 @@ def command(
         for note in run.notes:
             voice.warn(note)
         merged = (number, driver) if merge and number is not None else None
+        if number is not None and merged is None:
+            note_own_clip(name, driver, voice)
         return add_rigid_motion(document, run, name, merged), run.report, _summary(run.report)
 
     simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)
