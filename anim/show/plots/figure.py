@@ -49,17 +49,20 @@ INSTALL = "pip install 'gltf-anim[plot]'"
 
 
 class Figure:
-    """A figure of fixed size in inches; x and y count from its top left corner."""
+    """A figure of fixed size in inches; x and y count from its top left corner.
+
+    offset: inches that are added to y, to draw one plot below another.
+    """
 
     def __init__(self, width: float, height: float) -> None:
         from matplotlib.figure import Figure
 
-        self.width, self.height = width, height
+        self.width, self.height, self.offset = width, height, 0.0
         self.figure = Figure(figsize=(width, height), dpi=DPI, facecolor=PAPER)
 
     def panel(self, x: float, y: float, width: float, height: float) -> Axes:
         """Return new axes with hairlines at the ticks of y only; its top left corner is at x, y."""
-        rect = (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height)
+        rect = (x / self.width, 1 - (self.offset + y + height) / self.height, width / self.width, height / self.height)
         axes = self.figure.add_axes(rect)
         axes.set_facecolor("none")
         for side in ("top", "left", "right"):
@@ -73,7 +76,7 @@ class Figure:
     def text(self, x: float, y: float, words: str, **style: Any) -> float:
         """Write text with its first baseline at x, y, and return its width in inches."""
         style = {"fontsize": TEXT, "va": "baseline", "ha": "left", "parse_math": False, **style}
-        self.figure.text(x / self.width, 1 - y / self.height, words, **style)
+        self.figure.text(x / self.width, 1 - (self.offset + y) / self.height, words, **style)
         return text_width(words, style["fontsize"], style.get("weight", "normal"))
 
     def line(self, x: Sequence[float], y: Sequence[float], **style: Any) -> None:
@@ -81,7 +84,7 @@ class Figure:
         from matplotlib.lines import Line2D
 
         across = [each / self.width for each in x]
-        down = [1 - each / self.height for each in y]
+        down = [1 - (self.offset + each) / self.height for each in y]
         self.figure.add_artist(Line2D(across, down, **style))
 
     def render(self, kind: str) -> bytes:

@@ -19,7 +19,7 @@ from anim.show.plots.figure import (
     separate_labels,
     style,
 )
-from anim.show.plots.stability_plot import stability_plot
+from anim.show.plots.stability_plot import STABILITY_HEIGHT, draw_stability, stability_plot
 from anim.show.plots.stability_titles import format_step
 from anim.simulation.report import RunHistory, SimulationReport
 
@@ -27,6 +27,8 @@ WIDTH, LEFT, HEAD = 11.6, 0.75, 0.95  # inches
 ENERGY, ERROR, GAP, POSES = 2.3, 1.1, 0.55, 4.0
 LABELS, CURVES = 1.1, 6.3
 NUM_POSES = 9
+RUN_HEIGHT = HEAD + POSES + 0.5
+MANY_EDGES = 200  # drawn as thin lines
 MAX_PATHS = 60  # points with a path; more only fill the picture
 
 
@@ -35,11 +37,12 @@ def simulation_plot(report: SimulationReport, *, kind: str) -> bytes:
 
     Raises UnsupportedError where matplotlib is not installed.
     """
-    if report.compare is not None:
+    if report.compare is not None and report.history is None:
         return stability_plot(report.compare(), kind=kind)
     with style(kind):
         has_error = report.history is not None and len(report.history.errors) > 0
-        sheet = Figure(WIDTH, HEAD + POSES + 0.4)
+        below = 0.0 if report.compare is None else STABILITY_HEIGHT
+        sheet = Figure(WIDTH, RUN_HEIGHT + below)
         sheet.text(LEFT - 0.4, 0.35, _title(report), fontsize=TITLE + 2, weight="bold")
         sheet.text(LEFT - 0.4, 0.6, report.advice or _subtitle(report), color=SOFT)
         if report.history is not None and len(report.history.times) > 1:
@@ -47,6 +50,9 @@ def simulation_plot(report: SimulationReport, *, kind: str) -> bytes:
             if has_error:
                 _draw_error(sheet, report.history)
             _draw_poses(sheet, report.history)
+        if report.compare is not None:
+            sheet.offset = RUN_HEIGHT
+            draw_stability(sheet, report.compare())
         return sheet.render(kind)
 
 
@@ -58,6 +64,8 @@ def _title(report: SimulationReport) -> str:
     if report.energy_j is not None:
         ends = [format_number(report.energy_j[key]) for key in ("start", "end")]
         parts.append(f"energy {ends[0]} → {ends[1]} J")
+    if report.worst_stretch is not None:
+        parts.append(f"stretched by {float(100 * report.worst_stretch['fraction']):.2g} % at most")
     if report.error_estimate_m is not None:
         parts.append(f"a run with half the step differs by up to {_length(report.error_estimate_m)}")
     return ": ".join([start, ", ".join(parts)]) if parts else start
@@ -125,12 +133,13 @@ def _draw_poses(sheet: Figure, history: RunHistory) -> None:
     axes.set_ylim(middle[1] - half * POSES, middle[1] + half * POSES)
     for point in range(0, points.shape[1], -(-points.shape[1] // MAX_PATHS)):
         axes.plot(points[:, point, 0], points[:, point, 1], color=FAINT, linewidth=0.8)
+    width = 1.0 if len(history.edges) < MANY_EDGES else 0.4
     for i, frame in enumerate(np.linspace(0, len(points) - 1, NUM_POSES).astype(int)):
         alpha = 0.12 + 0.88 * i / (NUM_POSES - 1)
         pose = points[frame]
         if len(history.edges):
             lines = edge_lines(pose, history.edges)
-            axes.plot(lines[:, 0], lines[:, 1], color=COLORS[2], linewidth=1, alpha=alpha)
+            axes.plot(lines[:, 0], lines[:, 1], color=COLORS[2], linewidth=width, alpha=alpha)
         else:
             axes.plot(pose[:, 0], pose[:, 1], "o", color=COLORS[2], markersize=3, alpha=alpha, markeredgewidth=0)
 

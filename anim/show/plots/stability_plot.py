@@ -12,6 +12,7 @@ from anim.show.plots.figure import (
     FAINT,
     HAIR,
     INK,
+    PAPER,
     SMALL,
     SOFT,
     TEXT,
@@ -52,6 +53,8 @@ LIMIT_WORDS = {INTEGRATORS["rk4"].limit: "2√2"}
 WIDTH, LEFT, HEAD, GAP = 11.6, 0.65, 0.95, 0.6  # inches
 CURVES, LOG, CHANGE, POSES = 6.3, 1.75, 1.45, 2.6
 LABELS = 1.75  # of the curves, at their right
+STABILITY_HEIGHT = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3 + POSES + 0.25
+ON_PAPER = {"facecolor": PAPER, "edgecolor": "none", "pad": 1.0, "alpha": 0.85}  # words over curves
 
 
 def stability_plot(compared: Comparison, *, kind: str) -> bytes:
@@ -59,22 +62,27 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
 
     Raises UnsupportedError where matplotlib is not installed.
     """
-    runs, omega_h, step, springs = compared.runs, compared.omega_h, compared.step, compared.springs
     with style(kind):
-        sheet = Figure(WIDTH, HEAD + LOG + 0.25 + CHANGE + GAP + 0.3 + POSES + 0.25)
-        equation = TEST_EQUATIONS[compared.test_equation]
-        sheet.text(LEFT - 0.4, 0.35, title(runs, equation, omega_h, step), fontsize=TITLE + 2, weight="bold")
-        sheet.text(LEFT - 0.4, 0.6, subtitle(equation, omega_h, step), color=SOFT)
-        _draw_energy(sheet, runs)
-        _draw_gain(sheet, equation, omega_h)
-        top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
-        shown = [run for name in SHOWN for run in runs if run.name == name]
-        width = (WIDTH - LEFT - 0.2) / len(shown)
-        drawn = [motion_points(run, springs, omega_h / step) for run in shown]
-        span = _span(shown, drawn)
-        for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
-            _draw_motion(sheet, run, points, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
+        sheet = Figure(WIDTH, STABILITY_HEIGHT)
+        draw_stability(sheet, compared)
         return sheet.render(kind)
+
+
+def draw_stability(sheet: Figure, compared: Comparison) -> None:
+    """Draw the plot on a sheet of its width, STABILITY_HEIGHT inches high."""
+    runs, omega_h, step, springs = compared.runs, compared.omega_h, compared.step, compared.springs
+    equation = TEST_EQUATIONS[compared.test_equation]
+    sheet.text(LEFT - 0.4, 0.35, title(runs, equation, omega_h, step), fontsize=TITLE + 2, weight="bold")
+    sheet.text(LEFT - 0.4, 0.6, subtitle(equation, omega_h, step), color=SOFT)
+    _draw_energy(sheet, runs)
+    draw_gain(sheet, equation, omega_h)
+    top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
+    shown = [run for name in SHOWN for run in runs if run.name == name]
+    width = (WIDTH - LEFT - 0.2) / len(shown)
+    drawn = [motion_points(run, springs, omega_h / step) for run in shown]
+    span = _span(shown, drawn)
+    for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
+        _draw_motion(sheet, run, points, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
 
 
 def _draw_energy(sheet: Figure, runs: Sequence[IntegratorRun]) -> None:
@@ -133,7 +141,8 @@ def _change(run: IntegratorRun) -> str:
     return words.replace("-", "−")
 
 
-def _draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> None:
+def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> Axes:
+    """Draw the gain of each integrator per step, its limits and this run; return the axes."""
     left = CURVES + 0.45
     height = LOG + 0.25 + CHANGE
     axes = sheet.panel(left, HEAD, WIDTH - left - 0.25, height)
@@ -150,26 +159,41 @@ def _draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> None:
                 linestyle=dotted,
             )
     axes.axhspan(1, MAX_GAIN, color="#d55e00", alpha=0.06, linewidth=0)
-    axes.text(0.06, MAX_GAIN - 0.06, "grows", fontsize=SMALL, color="#a33")
-    axes.text(0.06, lowest + 0.03, "fades", fontsize=SMALL, color=SOFT)
     for limit, words in _limits(equation):
         axes.axvline(limit, color=HAIR, linewidth=0.8)
-        axes.text(limit - 0.03, lowest + 0.03, words, fontsize=SMALL, rotation=90, ha="right", va="bottom", color=SOFT)
-    if 0 < omega_h <= equation.max_value:
-        axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
-        for name in (each for each in SHOWN if each in INTEGRATORS):
-            gain = float(equation.gain(INTEGRATORS[name], np.array(omega_h)))
-            if lowest <= gain <= MAX_GAIN:
-                axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
-        words = f"this run\n{equation.symbol} = {format_product(omega_h)}"
-        axes.text(omega_h + 0.05, lowest + 0.1, words, fontsize=SMALL)
-    elif omega_h > 0:
-        words = f"this run: {equation.symbol} = {format_product(omega_h)} →"
-        axes.text(equation.max_value - 0.05, 1.06, words, fontsize=SMALL, ha="right")
+        place = {"rotation": 90, "ha": "right", "va": "top", "color": SOFT, "bbox": ON_PAPER}
+        axes.text(limit - 0.03, MAX_GAIN - 0.02, words, fontsize=SMALL, **place)
+    side = (
+        {"x": 0.05, "ha": "left"}
+        if omega_h > equation.max_value / 2
+        else {"x": equation.max_value - 0.03, "ha": "right"}
+    )
+    axes.text(y=MAX_GAIN - 0.06, s="grows", fontsize=SMALL, color="#a33", **side)
+    axes.text(y=lowest + 0.03, s="fades", fontsize=SMALL, color=SOFT, **side)
+    _mark_run(axes, equation, omega_h, lowest)
     axes.set_xlim(0, equation.max_value)
     axes.set_ylim(lowest, MAX_GAIN)
     axes.set_xlabel(equation.about, fontsize=SMALL, color=SOFT)
     sheet.text(left, HEAD - 0.1, f"{equation.gain_of} gained per step", fontsize=TEXT)
+    return axes
+
+
+def _mark_run(axes: Axes, equation: TestEquation, omega_h: float, lowest: float) -> None:
+    """This run's ω·h, with the gains of the integrators that are drawn thick."""
+    words = f"{equation.symbol} = {format_product(omega_h)}"
+    if omega_h > equation.max_value:
+        axes.text(equation.max_value - 0.05, 1.06, f"this run: {words} →", fontsize=SMALL, ha="right", bbox=ON_PAPER)
+    if not 0 < omega_h <= equation.max_value:
+        return
+    axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
+    for name in (each for each in SHOWN if each in INTEGRATORS):
+        gain = float(equation.gain(INTEGRATORS[name], np.array(omega_h)))
+        if lowest <= gain <= MAX_GAIN:
+            axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
+    is_left = omega_h < 0.8 * equation.max_value
+    x = omega_h + (0.05 if is_left else -0.05)
+    y = lowest + 0.12
+    axes.text(x, y, f"this run\n{words}", fontsize=SMALL, ha="left" if is_left else "right", bbox=ON_PAPER)
 
 
 def _limits(equation: TestEquation) -> list[tuple[float, str]]:

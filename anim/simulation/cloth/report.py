@@ -19,6 +19,7 @@ from anim.simulation.cloth.options import ClothOptions
 from anim.simulation.cloth.solver import NO_FLOOR_M
 from anim.simulation.integrators import INTEGRATORS
 from anim.simulation.report import (
+    RunHistory,
     SimulationReport,
     advise_elongation,
     advise_half_step,
@@ -68,6 +69,7 @@ def make_report(
         penetration_m=_penetration(model, driver, options, frames.positions),
         error_estimate_m=error,
         loop_seam_m=None if seam is None else seam.distance,
+        history=_history(model, options, frames),
     )
 
 
@@ -119,6 +121,19 @@ def _report(
         compare=lambda: compare(model, driver, options, substeps),
         **measured,
     )
+
+
+def _history(model: ClothModel, options: ClothOptions, frames: ClothFrames) -> RunHistory:
+    """The run over time: energies above the lowest potential, kinetic by differences of positions."""
+    times = np.arange(len(frames.positions), dtype=np.float64) / options.fps
+    free = model.inverse_masses > 0
+    masses, x = 1 / model.inverse_masses[free], frames.positions[:, free]
+    potential = -(x @ np.asarray(options.environment.gravity)) @ masses
+    total, potential = frames.energies - potential.min(), potential - potential.min()
+    velocities = np.gradient(x, times, axis=0) if len(times) > 1 else np.zeros_like(x)
+    kinetic = 0.5 * np.einsum("fpc,fpc,p->f", velocities, velocities, masses)
+    energies = {"total": total, "kinetic": kinetic, "potential": potential}
+    return RunHistory(times, energies, frames.positions, model.topology.edges, np.empty(0))
 
 
 def _energy(energies: Floats) -> dict[str, float]:
