@@ -51,5 +51,5 @@ RULE = Rule(
     problem,
     "normal for sparse keys; for a grid: gltf-anim resample IN OUT --fps 30{clips}",
     parameters={"regular": Parameter(MIN_REGULAR_FRACTION, "%", "fraction of keys on a grid")},
-    fix=Fix("resample to 30 frames per second", fix, is_safe=False),
+    fix=Fix("resample to 30 frames per second", fix, is_safe=False, yields_to=frozenset({"GA102"})),
 )

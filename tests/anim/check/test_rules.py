@@ -74,6 +74,13 @@ def test_unsafe_fixes_are_not_applied_without_their_option(code: str) -> None:
     assert fix_all(broken(code), selection(code), unsafe=False).applied == ()
 
 
+@pytest.mark.parametrize("code", ["GA109", "GA111"])
+def test_a_fix_is_left_out_where_another_one_would_be_undone(code: str) -> None:
+    chosen = RuleSelection(select=(code, "GA102"))
+    (refused,) = fix_all(broken(code), chosen, unsafe=True).refused
+    assert (refused.rule.code, refused.problem) == (code, "that would undo the fix of GA102")
+
+
 def test_a_node_hidden_by_step_is_no_zero_scale() -> None:
     hidden = track("scale", np.array([0.0, 1.0]), [[1, 1, 1], [0, 0, 0]], STEP, node=1)
     assert found(with_tracks(hidden), "GA116") == []
