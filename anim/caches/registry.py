@@ -68,7 +68,9 @@ def _usd(ending: str, about: str, begins: Signature) -> CacheFormat:
 
 def _texture(ending: str, about: str, magic: bytes, *takes: str) -> CacheFormat:
     write = partial(writer.write, ending=ending)
-    return CacheFormat(about, reader.read, write, starts_with(magic), frozenset(takes), NORMALS, Files.SEVERAL)
+    return CacheFormat(
+        about, reader.read, write, starts_with(magic), frozenset((*takes, "source")), NORMALS, Files.SEVERAL
+    )
 
 
 CACHE_FORMATS: dict[str, CacheFormat] = {

@@ -64,7 +64,7 @@ def command(
         typer.Option(
             "--normals/--no-normals",
             help=f"Bake normals too ({', '.join(caches.formats_with('normals'))}); by default for formats with "
-            f"materials ({', '.join(caches.formats_with_materials())}) if one is lit.",
+            f"materials ({', '.join(caches.formats_with_materials(with_normals=True))}) if one is lit.",
             show_default=False,
         ),
     ] = None,
@@ -107,6 +107,7 @@ def command(
     extensions stay, and so do unskinned meshes, cameras and lights with their channels. Skins and the channels of
     joints are left out, or stay with --keep-skeleton; so are meshes that --mesh does not select, and other clips.
     USD has the materials as UsdPreviewSurface; their images are in a .usdz, and beside a .usdc or .usda.
+    The mesh of a texture keeps them too, and has its look-up in the next free set of texture coordinates.
     """
     voice = Reporter(quiet, verbose)
     began = time.perf_counter()

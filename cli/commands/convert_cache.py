@@ -114,7 +114,7 @@ def command(
         if onto is not None:
             source = stack.enter_context(documents.source(onto, voice))
             number = choose_clip(source, clip)
-            cache, given["source"] = onto_source(cache, source, number, keep_skeleton=keep_skeleton)
+            cache, given["source"] = onto_source(cache, source, number, ending, keep_skeleton=keep_skeleton)
         writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:

@@ -124,9 +124,10 @@ def formats_with(what: str) -> tuple[str, ...]:
     return tuple(ending for ending, format in CACHE_FORMATS.items() if what in format.holds)
 
 
-def formats_with_materials() -> tuple[str, ...]:
-    """Return the file extensions of the formats that take materials from the source."""
-    return tuple(ending for ending, format in CACHE_FORMATS.items() if "source" in format.takes)
+def formats_with_materials(*, with_normals: bool = False) -> tuple[str, ...]:
+    """Return the file extensions of the formats that take materials from the source; of those that show normals."""
+    wanted = [ending for ending, format in CACHE_FORMATS.items() if "source" in format.takes]
+    return tuple(each for each in wanted if not with_normals or "tangents" in CACHE_FORMATS[each].holds)
 
 
 def check_supported(ending: str, **wanted: bool) -> None:

@@ -80,7 +80,7 @@ def default_directions(
     document: Document, scene: Scene, nodes: Sequence[int] | None, ending: str, *, rigid: bool
 ) -> tuple[bool, bool]:
     """Return whether normals and tangents are baked by default: in formats with materials that show them."""
-    if not keeps_materials(ending):
+    if not (keeps_materials(ending) and "tangents" in CACHE_FORMATS[ending].holds):
         return False, False
     chosen = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
     is_lit = has_lit_normals(document.json, chosen)
@@ -123,14 +123,16 @@ def source_options(
 
 
 def onto_source(
-    cache: VertexCache, source: Source, clip: int | None, *, keep_skeleton: bool = False
+    cache: VertexCache, source: Source, clip: int | None, ending: str, *, keep_skeleton: bool = False
 ) -> tuple[VertexCache, BakeSource]:
     """Return a cache in world space with normals if the source is lit, and the source.
 
     clip: index of its clip. Raises RangeError for vertices that do not fit.
     """
     document = self_contained(source, {each.mesh for each in baked_meshes(cache, source.document)})
-    return with_shading_normals(cache, document), BakeSource(document, clip, keep_skeleton=keep_skeleton)
+    if "tangents" in CACHE_FORMATS[ending].holds:
+        cache = with_shading_normals(cache, document)
+    return cache, BakeSource(document, clip, keep_skeleton=keep_skeleton)
 
 
 def choose_clip(source: Source, globs: Sequence[str] | None) -> int | None:

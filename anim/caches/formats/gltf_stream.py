@@ -94,9 +94,9 @@ class GlbFile:
             shutil.copyfileobj(self._bin, file, COPY_BYTES)
 
 
-def write_document(document: Document, outputs: Outputs) -> None:
-    """Write a document as a GLB to the main file."""
-    with outputs.create(outputs.main) as file:
+def write_document(document: Document, outputs: Outputs, name: str = "") -> None:
+    """Write a document as a GLB to the file `name`, by default the main one."""
+    with outputs.create(name or outputs.main) as file:
         for piece in container.glb(document):
             file.write(piece.data)
 

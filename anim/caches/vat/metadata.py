@@ -2,8 +2,8 @@
 
 schema 1 · kind "vertex animation texture" · preset · engine {axes "x z y", signs, units_per_meter} · vertices · frames
 · fps (if even) · times_s · width · height · rows_per_frame · origin "top left" · position {file, format, encoding,
-offset, scale} · normal {the same} or null · mesh · uv_set 1 · uv_v "top" or "bottom": origin of v · up.
-Positions are in the engine's axes and units.
+offset, scale} · normal {the same} or null · mesh · uv_set: n of its TEXCOORD_n · uv_v "top" or
+"bottom": origin of v · up. Positions are in the engine's axes and units.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ class VatMetadata:
     vertices: int
     times: tuple[float, ...]
     up: str
+    uv_set: int = 1
 
     def with_normals(self, name: str) -> VatMetadata:
         """Return a copy with normals in a file of this name."""
@@ -80,7 +81,7 @@ def text(about: VatMetadata, engine: Preset) -> bytes:
         },
         "normal": None if about.normal is None else {"file": about.normal, "format": about.format, **unit},
         "mesh": about.mesh,
-        "uv_set": 1,
+        "uv_set": about.uv_set,
         "uv_v": "bottom" if engine.is_flipped else "top",
         "up": about.up,
     }
@@ -108,6 +109,7 @@ def parse(data: bytes) -> VatMetadata:
             int(content["vertices"]),
             tuple(float(value) for value in content["times_s"]),
             str(content["up"]),
+            int(content.get("uv_set", 1)),
         )
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise FormatError(NOT_METADATA) from None

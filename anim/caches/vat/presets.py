@@ -16,7 +16,8 @@ class Preset:
 
     axes: indices of glTF's axes (0, 1, 2) for its x, y, z; signs: ±1 for each. per_meter: its units per metre.
     is_flipped: True if v counts from the bottom row after the engine's own loader.
-    endings: extensions of lossless formats. advice: settings for the user, a line each.
+    endings: extensions of lossless formats. advice: settings for the user, a line each. coordinate_sets: largest number
+    of sets of texture coordinates of a mesh.
     """
 
     axes: tuple[int, int, int]
@@ -25,15 +26,19 @@ class Preset:
     is_flipped: bool
     endings: tuple[str, ...]
     advice: tuple[str, ...] = ()
+    coordinate_sets: int = 8
 
 
 NEAREST = "nearest filter, no mipmaps, no compression, no sRGB"
+LIGHTMAPS = (
+    "Light Baking: not Static Lightmaps, which replaces the second set of coordinates; no LODs, no shadow meshes"
+)
 PRESETS = {
     "plain": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr", ".png"), (f"axes of glTF, v from the top; {NEAREST}",)),
     "three": Preset(  # EXRLoader flips the rows
         (0, 1, 2), (1, 1, 1), 1.0, True, (".exr",), (f"EXRLoader, FloatType or HalfFloatType; {NEAREST}",)
     ),
-    "godot": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr",), (f"import as lossless; {NEAREST}",)),
+    "godot": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr",), (f"import as lossless; {NEAREST}", LIGHTMAPS), 2),
     "unity": Preset((0, 1, 2), (-1, 1, 1), 1.0, False, (".exr", ".png"), (f"mesh through glTFast; {NEAREST}",)),
     "unreal": Preset((0, 2, 1), (1, 1, 1), 100.0, False, (".exr", ".png"), (f"mesh through Interchange; {NEAREST}",)),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats
+from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats import exr, png
 from anim.caches.options import ReadOptions
 from anim.caches.storage import Inputs, read_all, size_of
@@ -16,7 +16,7 @@ from anim.errors import FormatError
 from anim.gltf.io import container
 from anim.gltf.reading import reader as gltf
 from anim.memory import MemoryBudget
-from anim.model import FrameChunk, Mesh, VertexCache
+from anim.model import FrameChunk, VertexCache
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
@@ -27,31 +27,35 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     with read_all(inputs, name) as data:
         about = metadata.parse(data)
     engine = presets.PRESETS[about.preset]
-    mesh = _mesh(inputs, about)
+    rest, faces = _mesh(inputs, about)
     packed = PixelEncoding(about.format, np.array(about.offset), np.array(about.scale))
     numbers = packed.numbers(_pixels(inputs, about.position, about))
     if about.encoding == "offset":
-        numbers = numbers + presets.to_engine(mesh.positions, engine)
+        numbers = numbers + presets.to_engine(rest, engine)
     positions = presets.from_engine(numbers, engine).astype(np.float32)
     normals = None if about.normal is None else _normals(inputs, about.normal, about, engine)
     chunk = FrameChunk(0, positions, normals)
     return VertexCache(
         np.array(about.times),
         about.vertices,
-        mesh.faces,
+        faces,
         lambda: iter((chunk,)),
-        rest=mesh.positions,
+        rest=rest,
         has_normals=normals is not None,
         up="z" if about.up == "z" else "y",
     )
 
 
-def _mesh(inputs: Inputs, about: VatMetadata) -> Mesh:
+def _mesh(inputs: Inputs, about: VatMetadata) -> tuple[Floats, Ints]:
+    """Positions (V, 3) and faces of the companion mesh, whose nodes are in the order of the vertices."""
     with read_all(inputs, about.mesh) as data:
         scene = gltf.scene(container.read(np.frombuffer(data, np.uint8)))
     if scene.vertex_count != about.vertices:
         raise FormatError(f"'{about.mesh}' has {scene.vertex_count} vertices (the JSON says {about.vertices})")
-    return scene.instances[0].mesh
+    meshes = [each.mesh for each in scene.instances]
+    starts = np.cumsum([0, *(len(each.positions) for each in meshes)])
+    faces = [each.faces + start for each, start in zip(meshes, starts, strict=False)]
+    return np.concatenate([each.positions for each in meshes]), np.concatenate(faces)
 
 
 def _pixels(inputs: Inputs, name: str, about: VatMetadata) -> AnyArray:

@@ -9,6 +9,9 @@
 
 For a NAME.png they are NAME.png-normal.png, NAME.png.json and NAME.png-mesh.glb.
 
+With a source the mesh has its materials and texture coordinates, and the pixels' centers in the next free set, `uv_set`
+of the JSON.
+
 Row 0 is at the top of the file. A pixel p means position = offset + scale · p, plus the rest mesh if `encoding` is
 "offset"; PNG values range from 0 to 1. EXR of floats is lossless and absolute; half floats and PNG are offsets.
 """
@@ -23,13 +26,15 @@ import numpy as np
 from anim.arrays import AnyArray, Floats
 from anim.caches import rest_mesh
 from anim.caches.formats import exr, png
-from anim.caches.formats.gltf_stream import GlbFile, primitive
+from anim.caches.formats.gltf_stream import GlbFile, primitive, write_document
 from anim.caches.options import WriteOptions, WriteResult
+from anim.caches.source_document.bake_source import BakeSource
+from anim.caches.source_document.lookup_mesh import free_coordinate_set, place_lookup_mesh
 from anim.caches.storage import Outputs, companion_name
 from anim.caches.transforms import statistics
 from anim.caches.vat import metadata, presets
 from anim.caches.vat.presets import Preset
-from anim.errors import RangeError
+from anim.errors import RangeError, UnsupportedError
 from anim.gltf.authoring_parts import VERTICES
 from anim.model import VertexCache
 
@@ -79,6 +84,13 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
     if kind not in ("unorm16", *exr.TYPES):
         raise RangeError(f"`depth` is '{kind}' (expected {', '.join(exr.TYPES)})")
     still = rest_mesh.positions(cache)
+    uv_set = 1 if writing.source is None else free_coordinate_set(cache, writing.source.document)
+    if uv_set >= engine.coordinate_sets:
+        raise UnsupportedError(
+            f"preset {writing.preset}: its meshes have {engine.coordinate_sets} sets of texture coordinates, and the "
+            "source uses all of them",
+            help="remove a set from the source, or use another preset",
+        )
     base = np.zeros_like(still) if kind == "float" else presets.to_engine(still, engine)
     packed = _encode_pixels(cache, engine, base, kind)
     worst = _write_image(_bands(cache, engine, base, packed), outputs, outputs.main, grid, packed)
@@ -96,13 +108,14 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
         vertices=cache.vertex_count,
         times=tuple(cache.times.tolist()),
         up=cache.up,
+        uv_set=uv_set,
     )
     if cache.has_normals:
         name = companion_name(outputs.main, f"-normal{ending}")
         turned = of_directions(kind)
         _write_image(_normal_bands(cache, engine, turned), outputs, name, grid, turned)
         about = about.with_normals(name)
-    _write_mesh(cache, still, grid, engine, outputs, about.mesh)
+    _write_mesh(cache, still, grid, engine, outputs, about.mesh, writing.source)
     with outputs.create(f"{outputs.main}.json") as file:
         file.write(metadata.text(about, engine))
     return WriteResult(worst / engine.per_meter, (*engine.advice, *statistics.notes(cache.times)))
@@ -179,25 +192,40 @@ def _write_image(
 
 
 def _write_mesh(
-    cache: VertexCache, still: Floats, grid: TextureLayout, engine: Preset, outputs: Outputs, name: str
+    cache: VertexCache,
+    still: Floats,
+    grid: TextureLayout,
+    engine: Preset,
+    outputs: Outputs,
+    name: str,
+    source: BakeSource | None,
 ) -> None:
     """The rest mesh as a GLB, in glTF's axes: the engine's importer converts it like the preset."""
-    from pygltflib import Mesh, Node
-
-    file = GlbFile()
     v = np.arange(cache.vertex_count)
     uv = np.stack(((v % grid.width + 0.5) / grid.width, (v // grid.width + 0.5) / grid.height), axis=1)
     if engine.is_flipped:
         uv[:, 1] = 1 - uv[:, 1]
+    normals = next(cache.chunks()).normals if cache.has_normals else None
+    first = None if normals is None else normals[0]
+    if source is not None:
+        write_document(place_lookup_mesh(cache, still, first, uv, source), outputs, name)
+    else:
+        _write_plain_mesh(cache, still, first, uv, outputs, name)
+
+
+def _write_plain_mesh(
+    cache: VertexCache, still: Floats, normals: AnyArray | None, uv: AnyArray, outputs: Outputs, name: str
+) -> None:
+    from pygltflib import Mesh, Node
+
+    file = GlbFile()
     attributes = {
         "POSITION": file.add(still.astype("<f4"), target=VERTICES, bounds=True),
         "TEXCOORD_0": file.add(uv.astype("<f4"), target=VERTICES),
         "TEXCOORD_1": file.add(uv.astype("<f4"), target=VERTICES),
     }
-    if cache.has_normals:
-        normals = next(cache.chunks()).normals
-        assert normals is not None
-        attributes["NORMAL"] = file.add(normals[0].astype("<f4"), target=VERTICES)
+    if normals is not None:
+        attributes["NORMAL"] = file.add(normals.astype("<f4"), target=VERTICES)
     indices = file.add_indices(cache.faces, cache.vertex_count)
     file.gltf.meshes.append(Mesh(name="rest", primitives=[primitive(attributes, indices)]))
     file.gltf.nodes.append(Node(name="rest", mesh=0))

@@ -188,7 +188,7 @@ def command(
         None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
     )
     if keeps_materials(ending):
-        cache, given["source"] = onto_source(_as_part(cache, scene, node), source, number)
+        cache, given["source"] = onto_source(_as_part(cache, scene, node), source, number, ending)
     saved = cache_files.save(
         cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
     )
