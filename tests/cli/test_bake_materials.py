@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from anim.gltf.document import Document
+from anim.gltf.document import Document, copy_json
 from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from tests.cli.conftest import Call, Find
 from tests.cli.running import help_line, refusal
-from tests.files import glb_of, opened, opened_path
+from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.judge import needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
 from tests.textured import UNKNOWN, looks, textured
@@ -241,3 +242,17 @@ def test_nothing_of_the_skin_is_left(call: Call, source: Path) -> None:
     assert (5121, "VEC4") not in kinds
     assert (5126, "MAT4") not in kinds
     assert opened(glb_of(document)).json == document.json
+
+
+@pytest.mark.parametrize("layout", ["flip-scale", "flip-visibility"])
+def test_pages_of_a_mesh_that_nodes_share_are_their_own(call: Call, tmp_path: Path, layout: str) -> None:
+    document = opened_fixture("morph_cube")
+    json = copy_json(document.json)
+    cube = next(node for node in json["nodes"] if "mesh" in node)
+    json["nodes"].append({"mesh": cube["mesh"], "translation": [5, 0, 0]})
+    json["scenes"][0]["nodes"].append(len(json["nodes"]) - 1)
+    path = tmp_path / "two.glb"
+    path.write_bytes(glb_of(replace(document, json=json)))
+    pages = baked(call, path, "--clip", "#0", "--layout", layout, "--fps", "2").json["nodes"]
+    meshes = [node["mesh"] for node in pages if "mesh" in node]
+    assert len(set(meshes)) == len(meshes) > 2

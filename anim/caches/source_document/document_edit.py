@@ -21,7 +21,7 @@ class DocumentEdit:
     """A source document under edit.
 
     json: the edited copy. new: accessors for it. channels, samplers: of the baked clip, besides those that stay.
-    roots: nodes with vertices in world space.
+    roots: nodes with vertices in world space. replaced: meshes of the source in whose place there is a page.
     """
 
     source: BakeSource
@@ -31,6 +31,7 @@ class DocumentEdit:
     channels: list[Json] = field(default_factory=list)
     samplers: list[Json] = field(default_factory=list)
     roots: set[int] = field(default_factory=set)
+    replaced: set[int] = field(default_factory=set)
 
     @classmethod
     def of(cls, source: BakeSource, meshes: Sequence[BakedMesh]) -> DocumentEdit:
@@ -48,8 +49,9 @@ class DocumentEdit:
         return placed
 
     def add_mesh(self, mesh: Json, old: int | None) -> int:
-        """Add a mesh without a node, at the index of an `old` one that no node uses; return its index."""
-        if old is not None:
+        """Add a mesh without a node, at the index of an `old` one that nothing uses; return its index."""
+        if old is not None and old not in self.replaced:  # a mesh that several nodes share has pages for each
+            self.replaced.add(old)
             return placement.add_mesh(self.json, mesh, old)
         self.json["meshes"].append(mesh)
         return len(self.json["meshes"]) - 1
