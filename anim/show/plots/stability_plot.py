@@ -50,6 +50,7 @@ VERLET_LIMIT = 2.0  # ω·h
 MIN_GAIN, MAX_GAIN = 0.5, 1.6
 MAX_RIPPLE = 0.5  # of the energy; a larger change is a loss, by drag or impacts
 LIMIT_WORDS = {INTEGRATORS["rk4"].limit: "2√2"}
+NAMES_APART = ",\n"
 WIDTH, LEFT, HEAD, GAP = 11.6, 0.65, 0.95, 0.6  # inches
 CURVES, LOG, CHANGE, POSES = 6.3, 1.75, 1.45, 2.6
 LABELS = 1.75  # of the curves, at their right
@@ -163,13 +164,11 @@ def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> Axes:
         axes.axvline(limit, color=HAIR, linewidth=0.8)
         place = {"rotation": 90, "ha": "right", "va": "top", "color": SOFT, "bbox": ON_PAPER}
         axes.text(limit - 0.03, MAX_GAIN - 0.02, words, fontsize=SMALL, **place)
-    side = (
-        {"x": 0.05, "ha": "left"}
-        if omega_h > equation.max_value / 2
-        else {"x": equation.max_value - 0.03, "ha": "right"}
-    )
-    axes.text(y=MAX_GAIN - 0.06, s="grows", fontsize=SMALL, color="#a33", **side)
-    axes.text(y=lowest + 0.03, s="fades", fontsize=SMALL, color=SOFT, **side)
+    is_left = not 0.02 < omega_h / equation.max_value < 0.2  # elsewhere than the dashed line
+    x, grows = (0.02, MAX_GAIN - 0.06) if is_left else (0.99, 1.03)
+    side = {"fontsize": SMALL, "ha": "left" if is_left else "right"}
+    axes.text(x * equation.max_value, grows, "grows", color="#a33", **side)
+    axes.text(x * equation.max_value, lowest + 0.03, "fades", color=SOFT, **side)
     _mark_run(axes, equation, omega_h, lowest)
     axes.set_xlim(0, equation.max_value)
     axes.set_ylim(lowest, MAX_GAIN)
@@ -192,7 +191,7 @@ def _mark_run(axes: Axes, equation: TestEquation, omega_h: float, lowest: float)
             axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
     is_left = omega_h < 0.8 * equation.max_value
     x = omega_h + (0.05 if is_left else -0.05)
-    y = lowest + 0.12
+    y = 1.15 if lowest == 0 and omega_h < 1 else lowest + 0.12  # above the curves of drag
     axes.text(x, y, f"this run\n{words}", fontsize=SMALL, ha="left" if is_left else "right", bbox=ON_PAPER)
 
 
@@ -203,7 +202,9 @@ def _limits(equation: TestEquation) -> list[tuple[float, str]]:
         limit = equation.limit(method)
         if 0 < limit < np.inf and name != "velocity-verlet":
             names.setdefault(limit, []).append(name)
-    return [(limit, f"{LIMIT_WORDS.get(limit, f'{limit:.3g}')}: {', '.join(each)}") for limit, each in names.items()]
+    return [
+        (limit, f"{LIMIT_WORDS.get(limit, f'{limit:.3g}')}: {NAMES_APART.join(each)}") for limit, each in names.items()
+    ]
 
 
 def _span(runs: Sequence[IntegratorRun], drawn: Sequence[Floats]) -> tuple[Floats, float]:

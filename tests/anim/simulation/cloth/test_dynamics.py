@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import fixtures
 from anim.gltf.io import container
 from anim.gltf.reading import reader
-from anim.simulation.cloth.colliders import Plane
+from anim.simulation.cloth.colliders import Capsule, Plane
 from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.options import ClothOptions
 from anim.simulation.cloth.selection import select_vertices
@@ -93,3 +95,33 @@ def test_pinned_vertices_follow_the_skin_at_every_frame() -> None:
     times = np.arange(25) / 24
     expected = bake(scene, clip, times=times, rigid=True, nodes=[instance.node]).load_all().positions
     np.testing.assert_allclose(run.cache.load_all().positions[1:, pinned], expected[1:, pinned], atol=1e-6)
+
+
+STARTS = ("edge", "corners", "one corner", "ball", "wind", "relaxation", "self-collision")
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_half_the_step_changes_the_result_by_less_than_the_estimate(start: str) -> None:
+    positions, faces = sheet(9, 9)
+    x, z = positions[:, 0], positions[:, 2]
+    pinned = {"corners": (x == 0) & np.isin(z, [0.0, 1.0]), "one corner": (x == 0) & (z == 0), "ball": x < 0}
+    options: dict[str, Any] = {"duration": 0.5, "substeps": 6, "environment": STILL}
+    if start == "wind":
+        options["environment"] = Environment(wind=(6.0, 0, 2))
+    if start == "ball":
+        options["obstacles"] = (Capsule((0.5, 0.7, 0.5), (0.5, 0.7, 0.5), 0.2),)
+    if start == "relaxation":
+        options["solver"] = start
+    run, coarse = simulate(
+        *(positions, faces, pinned.get(start, x == 0)),
+        **options,
+        self_collision=start == "self-collision",
+        estimate_error=True,
+    )
+    options["substeps"] = 12
+    _, fine = simulate(
+        *(positions, faces, pinned.get(start, x == 0)), **options, self_collision=start == "self-collision"
+    )
+    change = np.linalg.norm(coarse - fine, axis=2).max()
+    assert run.report.error_estimate_m is not None
+    assert 0 < change <= run.report.error_estimate_m
