@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 
 from anim.errors import UnsupportedError
 
 MIN_LIMIT_BYTES = 10**9
 LIMIT_PER_FILE_BYTE = 64  # above the ratio of good compression, of keys and of vertices, to float64
+
+THREAD_BYTES = 1 << 24  # stack and first allocations of a thread that a native package starts
 
 _chosen: ContextVar[int | None] = ContextVar("memory_limit", default=None)
 
@@ -27,6 +31,36 @@ def memory_limit(size: int | None) -> Iterator[None]:
 def limit_for(file_bytes: int) -> int:
     """Return the limit for a file of this size: the chosen one, or the larger of 1 GB and 64 times the file."""
     return _chosen.get() or max(MIN_LIMIT_BYTES, LIMIT_PER_FILE_BYTE * file_bytes)
+
+
+@contextmanager
+def limit_allocations(size: int) -> Iterator[None]:
+    """Let allocations beyond `size` bytes fail inside the block, on Linux: for native packages that count nothing."""
+    used = _data_bytes()
+    if used is None:
+        yield
+        return
+    import resource
+
+    usual = resource.getrlimit(resource.RLIMIT_DATA)
+    most = used + size + THREAD_BYTES * (os.cpu_count() or 1)
+    if usual[0] != resource.RLIM_INFINITY and usual[0] < most:
+        yield
+        return
+    resource.setrlimit(resource.RLIMIT_DATA, (most, usual[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, usual)
+
+
+def _data_bytes() -> int | None:
+    """Size of this process's data, as RLIMIT_DATA counts it; None on other systems than Linux."""
+    try:
+        with Path("/proc/self/status").open(encoding="ascii", errors="replace") as file:
+            return next((1024 * int(line.split()[1]) for line in file if line.startswith("VmData:")), None)
+    except (OSError, ValueError):
+        return None
 
 
 class MemoryBudget:

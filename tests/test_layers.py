@@ -47,6 +47,7 @@ OPENING = {  # modules of the library that may open a path
     "anim/gltf/io/images.py",
     "anim/gltf/io/source.py",
     "anim/gltf/io/unused_buffers.py",
+    "anim/memory.py",  # /proc/self/status
     "anim/optimization/process_pool.py",
     "anim/skinning/kernels/jit.py",  # where compiled kernels are kept
 }

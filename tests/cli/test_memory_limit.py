@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import struct
+import subprocess
+import sys
 import zipfile
 import zlib
 from pathlib import Path
@@ -18,7 +20,7 @@ from anim.errors import UnsupportedError
 from anim.gltf.meshopt import codec
 from fixtures.broken.pieces import data_uri, text
 from tests.cli.conftest import Call
-from tests.cli.running import built, help_line, refusal
+from tests.cli.running import ENVIRONMENT, ROOT, built, help_line, refusal
 
 GOOD = {
     "positions": np.zeros((2, 3, 3), "<f4"),
@@ -94,7 +96,7 @@ def test_the_limit_can_be_chosen(call: Call, tmp_path: Path) -> None:
     path.write_bytes(targets(3, 10_000))
     line = ("bake", path, tmp_path / "out.npz")
     assert "(limit 1e-06 GB)" in refusal(call(*line, "--memory-limit", "1kB"), 4)
-    call(*line, "--memory-limit", "10MB").product()
+    call(*line, "--memory-limit", "100MB").product()
     assert "--memory-limit is '0'" in refusal(call(*line, "--memory-limit", "0"), 2)
     assert memory.limit_for(0) == 10**9
     assert memory.limit_for(10**9) == 64 * 10**9
@@ -105,6 +107,21 @@ def test_the_sum_counts() -> None:
     budget.add(6 * 10**8)
     with pytest.raises(UnsupportedError, match=r"would take 1\.2 GB or more \(limit 1 GB\)"):
         budget.add(6 * 10**8)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux has this limit")
+def test_allocations_of_native_packages_have_a_limit() -> None:
+    code = """
+import numpy as np, os
+from anim.memory import limit_allocations
+size = 10**9 + 2**24 * os.cpu_count()
+with limit_allocations(10**8):
+    try: np.empty(size, np.uint8)
+    except MemoryError: print("refused")
+print(len(np.empty(size, np.uint8)) == size)
+"""
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=True)
+    assert run.stdout == b"refused\nTrue\n"
 
 
 def archive(folder: Path, name: str, shape: tuple[int, ...], size: int, kind: str = "<i4") -> Path:

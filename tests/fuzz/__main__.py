@@ -14,6 +14,7 @@ import re
 import sys
 import time
 import warnings
+import zlib
 from collections import Counter
 from pathlib import Path
 
@@ -108,16 +109,18 @@ def replay(folder: Path) -> int:
 
 
 def save(job: Job, path: Path) -> None:
-    """Write a job as JSON."""
+    """Write a job as JSON, its files compressed."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    files = {name: base64.b64encode(data).decode() for name, data in job.files.items()}
+    files = {name: base64.b64encode(zlib.compress(data)).decode() for name, data in job.files.items()}
     path.write_text(json.dumps({"line": list(job.line), "files": files}) + "\n")
 
 
 def load(path: Path) -> Job:
     """Read a job from JSON."""
     content = json.loads(path.read_text())
-    return Job(content["line"], {name: base64.b64decode(data) for name, data in content["files"].items()})
+    return Job(
+        content["line"], {name: zlib.decompress(base64.b64decode(data)) for name, data in content["files"].items()}
+    )
 
 
 if __name__ == "__main__":

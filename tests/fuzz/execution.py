@@ -18,7 +18,7 @@ from pathlib import Path
 from cli import main
 
 CPU_LIMIT_S = 10.0
-MEMORY_LIMIT_BYTES = 1_000_000_000  # of address space, beyond that of the process before
+MEMORY_LIMIT_BYTES = 4_000_000_000  # of address space: native packages reserve more than they use
 BATCH = 40  # command lines per process: forking takes as long as a short command
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +18,7 @@ from anim.caches.formats.npz import parts_of
 from anim.caches.options import ReadOptions
 from anim.caches.storage import Inputs
 from anim.errors import FormatError
+from anim.memory import limit_allocations, limit_for
 from anim.model import FrameChunk, VertexCache
 
 
@@ -35,7 +37,7 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str = ".usd") -> Verte
         stage.vertices,
         faces,
         lambda: _chunks(inputs, ending, codes, stage.vertices, stage.has_normals, stage.handedness is not None),
-        rest=None if still is None else still * stage.unit,
+        rest=None if still is None or len(still) != stage.vertices else still * stage.unit,
         has_normals=stage.has_normals,
         parts=parts if parts and parts[-1].vertices[1] == stage.vertices else (),
         up=stage.up,
@@ -51,11 +53,11 @@ def _opened(inputs: Inputs, ending: str) -> Iterator[_Stage]:
 
     with temporary_files.temp_input(inputs, inputs.main, ending) as path:
         try:
-            with temporary_files.silence_native():
+            with temporary_files.silence_native(), limit_allocations(limit_for(os.stat(path).st_size)):
                 stage = _Stage(path)
             yield stage
         except (Tf.ErrorException, UnicodeDecodeError):  # its messages are about its source code, not always text
-            raise FormatError("is no USD that can be read") from None
+            raise FormatError("is no USD that can be read", help="if it is large, raise `memory_limit`") from None
 
 
 class _Stage:
@@ -123,7 +125,10 @@ class _Stage:
         rows = []
         for mesh in self._meshes:
             matrix = np.array(mesh.ComputeLocalToWorldTransform(code))[:3, :3]
-            turned = np.asarray(of(mesh, code), np.float64)[:, :3] @ turn(matrix)
+            found = of(mesh, code)
+            if found is None:
+                raise FormatError(f"{mesh.GetPath()}: normals or tangents don't fit the points at time code {code:g}")
+            turned = np.asarray(found, np.float64)[:, :3] @ turn(matrix)
             rows.append(turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30))
         return np.concatenate(rows)
 
