@@ -58,7 +58,8 @@ RATE = frozenset(("input_fps",))
 
 def _frames(ending: str, about: str, begins: Signature, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
     read, write = partial(mesh_sequence.read, ending=ending), partial(mesh_sequence.write, ending=ending)
-    return CacheFormat(about, read, write, begins, RATE, holds, Files.FRAMES)
+    takes = RATE | {"source"} if ending != ".stl" else RATE
+    return CacheFormat(about, read, write, begins, takes, holds, Files.FRAMES)
 
 
 def _usd(ending: str, about: str, begins: Signature) -> CacheFormat:

@@ -89,3 +89,36 @@ def test_godot_reads_two_sets(call: Call, source: Path) -> None:
     assert "not Static Lightmaps" in run.err
     assert skinned != source.read_bytes()
     assert "does not apply" in refusal(call("convert-cache", source.with_name("a.exr"), "-", "--onto", source), 2)
+
+
+def test_obj_files_keep_texture_coordinates_and_materials(call: Call, source: Path) -> None:
+    document = opened_path(source)
+    assert call("bake", source, source.with_name("a.obj"), "--clip", "bend", "--rigid").code == 0
+    lines = source.with_name("a_00003.obj").read_text().splitlines()
+    assert "mtllib a.obj.mtl" in lines
+    rows = np.array([line.split()[1:] for line in lines if line.startswith("vt ")], float)
+    uv = Accessors(document).floats(document.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"])
+    assert rows[:18] == pytest.approx(np.stack((uv[:, 0], 1 - uv[:, 1]), axis=1), abs=1e-6)
+    assert [line for line in lines if line.startswith("usemtl")] == ["usemtl material0", "usemtl material1"]
+    library = source.with_name("a.obj.mtl").read_text()
+    assert "newmtl material1\nKd 1 1 1\nd 1\nmap_Kd a.obj-image1.png" in library
+    images = [each[1] for each in looks(document)["images"]]
+    assert [source.with_name(f"a.obj-image{i}.png").read_bytes() for i in range(2)] == images
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply"])
+def test_mesh_files_with_coordinates_are_read(call: Call, source: Path, ending: str) -> None:
+    import trimesh
+
+    assert call("bake", source, source.with_name(f"a.{ending}"), "--clip", "bend", "--normals").code == 0
+    assert call("bake", source, source.with_name("truth.npz"), "--clip", "bend", "--normals").code == 0
+    assert call("convert-cache", source.with_name(f"a.{ending}"), source.with_name("b.npz")).code == 0
+    with np.load(source.with_name("b.npz")) as found, np.load(source.with_name("truth.npz")) as truth:
+        assert found["positions"] == pytest.approx(truth["positions"], abs=1e-6)
+        assert found["normals"] == pytest.approx(truth["normals"], abs=1e-5)
+        assert np.array_equal(found["faces"], truth["faces"])
+    seen = trimesh.load(source.with_name(f"a_00001.{ending}"), process=False)
+    if ending == "obj":
+        assert seen is not None
+    else:
+        assert b"property float s\nproperty float t" in source.with_name("a_00001.ply").read_bytes()[:400]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Ints
+from anim.caches.formats.mesh_materials import MeshMaterials
 from anim.errors import FormatError
 
 OBJ_DIGITS = 9  # decimals
@@ -23,12 +24,13 @@ _TRIMESH = b"https://github.com/mikedh/trimesh"
 
 @dataclass(frozen=True, slots=True)
 class MeshFrame:
-    """positions (V, 3) float32, faces (T, 3), normals (V, 3) float32 or None, values of the comment."""
+    """positions (V, 3) float32, faces (T, 3), normals (V, 3) float32 or None, values of the comment, materials."""
 
     positions: AnyArray
     faces: Ints
     normals: AnyArray | None
     remark: dict[str, str]
+    materials: MeshMaterials | None = None
 
 
 def write(still: MeshFrame, ending: str) -> bytes:
@@ -45,8 +47,34 @@ def write(still: MeshFrame, ending: str) -> bytes:
         return remark.ljust(80)[:80] + data[80:]
     if ending == ".obj":
         text = export_obj(mesh, include_normals=normals is not None, include_texture=False, digits=OBJ_DIGITS)
+        if still.materials is not None:
+            text = _with_materials(text, still.materials)
         return _with_comment(text.encode(), b"# ", remark)
+    if still.materials is not None:
+        mesh.vertex_attributes.update(zip("st", still.materials.coordinates.T, strict=True))
     return _with_comment(ply.export_ply(mesh, vertex_normal=normals is not None), b"comment ", remark)
+
+
+def _with_materials(text: str, materials: MeshMaterials) -> str:
+    """The text of an OBJ with texture coordinates, and its faces below the names of their materials."""
+    lines = text.splitlines()
+    corners = [line.split()[1:] for line in lines if line.startswith("f ")]
+    new = [line for line in lines if not line.startswith("f ")]
+    new += [f"mtllib {materials.library}"] if materials.library else []
+    new += [f"vt {u:.9g} {v:.9g}" for u, v in materials.coordinates.tolist()]
+    current = None
+    for face, number in zip(corners, materials.of_face.tolist(), strict=True):
+        if number != current and number >= 0:
+            new.append(f"usemtl material{number}")
+        current = number
+        new.append("f " + " ".join(_corner(word) for word in face))
+    return "\n".join(new) + "\n"
+
+
+def _corner(word: str) -> str:
+    """A corner with the texture coordinate of its vertex: "4//4" → "4/4/4", "4" → "4/4"."""
+    vertex = word.split("/")[0]
+    return f"{vertex}/{vertex}/{vertex}" if "/" in word else f"{vertex}/{vertex}"
 
 
 def read(data: bytes, ending: str) -> MeshFrame:
@@ -80,7 +108,9 @@ def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray
     import trimesh
 
     try:
-        mesh: Any = trimesh.load(io.BytesIO(data), file_type=ending[1:], process=False, validate=False)
+        # trimesh else merges the vertices of a .ply with texture coordinates
+        more: dict[str, Any] = {"fix_texture": False} if ending == ".ply" else {}
+        mesh: Any = trimesh.load(io.BytesIO(data), file_type=ending[1:], process=False, validate=False, **more)
         positions = np.asarray(mesh.vertices)
         faces: Ints = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64).reshape(-1, 3)
     except Exception as error:  # trimesh raises exceptions of any type

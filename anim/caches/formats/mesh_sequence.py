@@ -11,8 +11,9 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks
 from anim.caches.formats import mesh_frame
+from anim.caches.formats.mesh_materials import mesh_materials, write_library
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.storage import Inputs, Outputs, read_all
+from anim.caches.storage import Inputs, Outputs, companion_name, read_all
 from anim.caches.transforms import statistics
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
@@ -47,6 +48,12 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending: str) -> WriteResult:
     """Write a file of the format `ending` per frame, numbered from 1; the main file for a single frame."""
     faces: Ints = cache.faces
+    materials = None
+    if writing.source is not None:
+        library = companion_name(outputs.main, ".mtl") if ending == ".obj" else ""
+        materials = mesh_materials(cache, writing.source.document, library)
+        if library:
+            write_library(writing.source.document, outputs, library)
     for chunk in cache.chunks():
         for i, positions in enumerate(chunk.positions):
             frame = chunk.first + i
@@ -54,7 +61,8 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
             remark = {"time": f"{cache.times[frame]:.9g}", "up": cache.up, "frames": str(cache.frame_count)}
             name = outputs.main if cache.frame_count == 1 else frame_number(outputs.main, frame + 1)
             with outputs.create(name) as file:
-                file.write(mesh_frame.write(mesh_frame.MeshFrame(positions, faces, normals, remark), ending))
+                mesh = mesh_frame.MeshFrame(positions, faces, normals, remark, materials)
+                file.write(mesh_frame.write(mesh, ending))
     notes = ("STL keeps no order of vertices: each triangle has three of its own",) if ending == ".stl" else ()
     return WriteResult(notes=(*notes, *statistics.notes(cache.times)))
 
