@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from anim.arrays import Floats
 from anim.simulation.particles.kernels.force_field import ForceField, acceleration, air_velocity
+from anim.simulation.particles.kernels.recording import add_energy
 from anim.simulation.particles.kernels.solids import (
     Solids,
     distance,
@@ -110,3 +112,20 @@ def slide_surface(
     v1 = add(moving, factor, tangential)
     x1 = add(x, h, v1)
     return True, add(x1, -distance(solids, k, i, f1, x1), normal(solids, k, i, f1, x1)), v1
+
+
+@jit
+def rest(
+    field: ForceField, grid: Grid, face: Vector, n: int, last: int, x: Vector, energies: Floats
+) -> int:  # fmt: skip
+    """Return the step from n on at which a particle at rest on a face begins to slide or leaves it, at most `last`."""
+    while n < last:
+        t = n * grid.step
+        a = acceleration(field, t, x, ORIGIN, air_velocity(field, t, x))
+        push = -dot(a, face)
+        if push < 0.0 or length(add(a, push, face)) > grid.friction * push:
+            break
+        n += 1
+        if n > 0 and n % grid.substeps == 0:
+            add_energy(energies, n // grid.substeps, field, n * grid.step, x, ORIGIN)
+    return n

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.simulation.particles.kernels.contact import ORIGIN, Grid, respond, slide_face, slide_surface
+from anim.simulation.particles.kernels.contact import ORIGIN, Grid, respond, rest, slide_face, slide_surface
 from anim.simulation.particles.kernels.force_field import (
     ForceField,
     acceleration,
@@ -23,6 +23,7 @@ from anim.simulation.particles.kernels.solids import (
     MOVING,
     TOUCH_M,
     Solids,
+    containing,
     distance,
     impact_fraction,
     is_flat,
@@ -92,7 +93,7 @@ def _run_particle(
     n = max(int(np.floor(birth / h)), grid.first)
     n += 1 if (n + 1) * h <= birth else 0
     n -= 1 if n * h > birth and n > grid.first else 0
-    resting, face, ignored = -1, ORIGIN, _containing(solids, n - grid.first, birth / h - n, x)
+    resting, face, ignored = -1, ORIGIN, containing(solids, n - grid.first, birth / h - n, x)
     is_asleep, has_begun = False, birth >= 0.0
     statistics[7] += 1.0 if ignored else 0.0
     keys = grow(keys, count)
@@ -125,7 +126,7 @@ def _run_particle(
                 stop = min(end, death)
         if resting >= 0 and grid.can_rest and length(v) == 0.0 and start == n * h and is_flat(solids, resting):
             last = min(grid.num_steps - 1, int(np.ceil(death / h)) - 1) if n >= 0 else 0
-            begun, n = n, _rest(field, grid, face, n, last, x, energies)
+            begun, n = n, rest(field, grid, face, n, last, x, energies)
             if n > begun:
                 if n > 0:
                     write_key(keys, count, n * h, x, v, v)
@@ -138,7 +139,7 @@ def _run_particle(
             )  # fmt: skip
             _note_penetration(solids, n - grid.first, stop / h - n, x, ignored, statistics)
             if ignored:  # until it has left
-                ignored &= _containing(solids, n - grid.first, stop / h - n, x)
+                ignored &= containing(solids, n - grid.first, stop / h - n, x)
             if n < 0:
                 count[0] = before
         speed = length(v)
@@ -280,34 +281,7 @@ def _fly(
 
 
 @jit
-def _rest(
-    field: ForceField, grid: Grid, face: Vector, n: int, last: int, x: Vector, energies: Floats
-) -> int:  # fmt: skip
-    """Step from n on at which a particle at rest on a face begins to slide or leaves it, at most `last`."""
-    while n < last:
-        t = n * grid.step
-        a = acceleration(field, t, x, ORIGIN, air_velocity(field, t, x))
-        push = -dot(a, face)
-        if push < 0.0 or length(add(a, push, face)) > grid.friction * push:
-            break
-        n += 1
-        if n > 0 and n % grid.substeps == 0:
-            add_energy(energies, n // grid.substeps, field, n * grid.step, x, ORIGIN)
-    return n
-
-
-@jit
 def _note_penetration(solids: Solids, i: int, f: float, x: Vector, ignored: int, statistics: Floats) -> None:
     for k in range(len(solids.shapes)):
         if not (ignored >> k) & 1:
             statistics[2] = max(statistics[2], -distance(solids, k, i, f, x))
-
-
-@jit
-def _containing(solids: Solids, i: int, f: float, x: Vector) -> int:
-    """Bits of the obstacles that a point is in."""
-    found = 0
-    for k in range(len(solids.shapes)):
-        if distance(solids, k, i, f, x) < -TOUCH_M:
-            found |= 1 << k
-    return found

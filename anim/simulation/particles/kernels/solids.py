@@ -238,3 +238,13 @@ def _reach(
         angle = 2 * np.arccos(min(cosine, 1.0))
         way += 1.5 * (length(add(b[0], -1.0, a[0])) + angle * (float(solids.shapes[k, BALL]) + way))
     return way
+
+
+@jit
+def containing(solids: Solids, i: int, f: float, x: Vector) -> int:
+    """Return the bits of the obstacles that a point is in."""
+    found = 0
+    for k in range(len(solids.shapes)):
+        if distance(solids, k, i, f, x) < -TOUCH_M:
+            found |= 1 << k
+    return found
