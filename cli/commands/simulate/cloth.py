@@ -40,7 +40,7 @@ from cli.workflows.simulation_report import check_report, write_report
 
 Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
 XPBD, MASS_SPRING = Solver("xpbd"), Solver("mass-spring")
-MIN_STRETCH = 0.05  # beyond, its cause is stated
+MIN_ELONGATION = 0.05  # beyond, its cause is stated
 SELECTOR = "x-min … z-max, joint:GLOB, weight:GLOB,MIN, material:GLOB or box:X,Y,Z,SX,SY,SZ"
 
 
@@ -235,11 +235,11 @@ def _summary(run: ClothRun, substeps: int) -> str:
 
 def _stretch(worst: Mapping[str, Any]) -> str:
     """The largest elongation and its cause, and apart that of edges without pinned ends if others are longer."""
-    cause = ", by the clip's first pose" if worst["time_s"] == 0 and worst["fraction"] > MIN_STRETCH else ""
+    cause = ", by the clip's first pose" if worst["time_s"] == 0 and worst["fraction"] > MIN_ELONGATION else ""
     words = f"stretched by {format_number(100 * worst['fraction'], 2)} % at most, at {worst['time_s']:.2f} s{cause}"
-    if worst["attached_edges"] > max(2 * worst["free_edges"], MIN_STRETCH):
+    if worst["attached_edges"] > max(2 * worst["free_edges"], MIN_ELONGATION):
         words += f" (edges without pinned ends by {format_number(100 * worst['free_edges'], 2)} %"
-        forced = worst["attachment"] if worst["attachment"] > MIN_STRETCH else 0.0
+        forced = worst["attachment"] if worst["attachment"] > MIN_ELONGATION else 0.0
         words += f"; the clip moves pinned ends apart by {format_number(100 * forced, 2)} %)" if forced else ")"
     return words
 
