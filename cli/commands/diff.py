@@ -118,7 +118,9 @@ def command(
     if new is not None and (one is None or other is None or _are_bake_and_source(one, other)):
         if plot is not None or player is not SPEC:
             raise UsageError(f"{'--plot' if plot is not None else '--player'} does not apply to caches and bakes")
-        opened = {side.file.name: (side.document, side.file.size) for side in (one, other) if side is not None}
+        opened = {
+            side.file.name: (side.document, side.file.size, side.scene) for side in (one, other) if side is not None
+        }
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, voice, opened=opened)
         _by_vertex(found_by_vertex, format, fail_above, voice, quiet=quiet)
         return

@@ -12,17 +12,17 @@ from anim.caches.registry import CACHE_FORMATS
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.compare.vertex_distance import vertex_distance
-from anim.model import Clip, VertexCache
+from anim.model import Clip, Scene, VertexCache
 from anim.operations.selection import Selection
 from cli.errors import UsageError
-from cli.io import cache_files, documents
+from cli.io import cache_files, documents, scenes
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter
 from cli.workflows import vertex_motion
 from cli.workflows.vertex_motion import VertexMotion, cache_motion, common_times, pair_documents, pair_with_cache
 
 GLTF = (".glb", ".gltf")
-Opened = Mapping[str, tuple[Document, int]]
+Opened = Mapping[str, tuple[Document, int, Scene]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +33,12 @@ class _Side:
     size: int
     document: Document | None
     cache: VertexCache | None
+    scene: Scene | None = None
+
+    def scene_of(self) -> Scene:
+        """Return the scene of a document."""
+        assert self.scene is not None
+        return self.scene
 
 
 def is_cache(path: str | None) -> bool:
@@ -47,7 +53,7 @@ def diff_by_vertex(
     """Compare two files by vertex, at all keys and frames of both, half-way between, and at `fps` per second.
 
     clips: globs for the clip of the glTF file; the cache's by name, or the only one. opened: documents that were read
-    already, with their sizes, by name.
+    already, with their sizes and scenes, by name.
     """
     with ExitStack() as stack:
         one, other = (stack.enter_context(_opened(path, voice, opened)) for path in (old, new))
@@ -66,12 +72,13 @@ def _opened(path: str, voice: Reporter, opened: Opened) -> Iterator[_Side]:
                 voice.warn(words)
             yield _Side(loaded.name, loaded.size, None, loaded.cache)
     elif documents.called(path) in opened:
-        document, size = opened[documents.called(path)]
-        yield _Side(documents.called(path), size, document, vertex_motion.pages_of(document))
+        document, size, scene = opened[documents.called(path)]
+        yield _Side(documents.called(path), size, document, vertex_motion.pages_of(document), scene)
     else:
         with documents.source(path, voice) as source:
             cache = vertex_motion.pages_of(source.document)
-            yield _Side(source.name, source.size, source.document, cache)
+            scene = scenes.read_scene(source.document, source.name, voice)
+            yield _Side(source.name, source.size, source.document, cache, scene)
 
 
 def _motions(one: _Side, other: _Side, globs: Sequence[str], voice: Reporter) -> tuple[str, VertexMotion, VertexMotion]:
@@ -80,14 +87,14 @@ def _motions(one: _Side, other: _Side, globs: Sequence[str], voice: Reporter) ->
         return "", cache_motion(one.cache), cache_motion(other.cache)
     if other.cache is not None and one.document is not None:
         clip = _clip(one, one.document, globs)
-        return clip.name, *pair_with_cache(one.document, clip, other.cache)
+        return clip.name, *pair_with_cache(one.document, one.scene_of(), clip, other.cache)
     if one.cache is not None and other.document is not None:
         clip = _clip(other, other.document, globs)
-        second, first = pair_with_cache(other.document, clip, one.cache)
+        second, first = pair_with_cache(other.document, other.scene_of(), clip, one.cache)
         return clip.name, first, second
     assert one.document is not None
     assert other.document is not None
-    if vertex_motion.is_bake_of(reader.scene(one.document), reader.scene(other.document)):
+    if vertex_motion.is_bake_of(one.scene_of(), other.scene_of()):
         return _of_documents((one, one.document), (other, other.document), globs, voice)
     label, second, first = _of_documents((other, other.document), (one, one.document), globs, voice)
     return label, first, second
@@ -99,7 +106,7 @@ def _of_documents(
     """Name of the clip, and the motions of a source and of its bake, which has one clip."""
     (played,) = reader.clips(baked[1])[:1] or (Clip("", ()),)
     clip = _clip(*source, globs or ([played.name] if played.name in reader.names(source[1]) else []))
-    sides = ((reader.scene(source[1]), clip), (reader.scene(baked[1]), played))
+    sides = ((source[0].scene_of(), clip), (baked[0].scene_of(), played))
     first, second, missing = pair_documents(*sides)
     if missing:
         voice.warn(f"{baked[0].name}: has no mesh like {', '.join(missing)}")

@@ -14,7 +14,6 @@ from anim.caches.transforms.resample import resample_frames
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import RangeError
 from anim.gltf.document import Document
-from anim.gltf.reading import reader
 from anim.model import Clip, MeshInstance, Scene, VertexCache
 from anim.sampling.times import frame_times
 from anim.skinning.bake import bake
@@ -43,9 +42,10 @@ class VertexMotion:
             yield from chunk.positions[:, self.columns]
 
 
-def pair_with_cache(document: Document, clip: Clip, cache: VertexCache) -> tuple[VertexMotion, VertexMotion]:
+def pair_with_cache(
+    document: Document, scene: Scene, clip: Clip, cache: VertexCache
+) -> tuple[VertexMotion, VertexMotion]:
     """Return a clip of a document and a cache of it. Raises RangeError for vertices that do not fit."""
-    scene = reader.scene(document)
     meshes = baked_meshes(cache, document)
     by_node = {each.node: each for each in scene.instances}
     instances = [by_node[each.node] for each in meshes]
