@@ -186,7 +186,7 @@ def _meta(archive: zipfile.ZipFile, budget: MemoryBudget) -> dict[str, Any]:
     text = _array(archive, "meta", budget)
     try:
         meta = json.loads(str(text)) if text is not None else {}
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError, SystemError):  # the last of code points beyond Unicode
         raise FormatError("array 'meta' is no JSON") from None
     return meta if isinstance(meta, dict) else {}
 
