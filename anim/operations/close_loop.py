@@ -9,12 +9,19 @@ from anim.operations.selection import track_indices
 
 
 def close_loop(
-    clip: Clip, found: Loop, *, root: int = -1, blend: float | None = None, tracks: frozenset[int] | None = None
+    clip: Clip,
+    found: Loop,
+    *,
+    root: int = -1,
+    blend: float | None = None,
+    tracks: frozenset[int] | None = None,
+    frame_rate: float | None = None,
 ) -> Clip:
     """Return the clip as a loop: with a missing last frame added, and its end corrected over `blend` seconds.
 
     found: its analysis; of a clip that is closed except some joints only these are corrected. root: node that travels,
     and keeps its translation. blend: seconds, None to add a missing frame only. tracks: indices, None for all.
+    frame_rate: of the keys added in the blend, None for even spacing.
     """
     chosen = track_indices(clip, tracks)
     if found.kind is LoopKind.OPEN_BY_ONE_FRAME:
@@ -24,4 +31,4 @@ def close_loop(
     if found.kind is LoopKind.CLOSED_EXCEPT:
         chosen &= open_tracks(clip)
     travel = {i for i, track in enumerate(clip.tracks) if track.node == root and track.path == "translation"}
-    return loop(clip, blend=blend, tracks=chosen - travel)
+    return loop(clip, blend=blend, tracks=chosen - travel, frame_rate=frame_rate)

@@ -55,12 +55,13 @@ def _is_closed(track: Track) -> bool:
     return bool((first == last).all() or (track.kind is ValueKind.ROTATION and (first == -last).all()))
 
 
-def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> Clip:
+def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, frame_rate: float | None = None) -> Clip:
     """Return the clip with its last `blend` seconds corrected to end as it starts, in value and speed.
 
     The correction is added to the motion: a cubic from 0 to the loop gap in value and speed; for rotations a rotation
     vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks end with their first value.
-    Tracks not in `tracks` keep their end, for example of a traveling root.
+    Tracks not in `tracks` keep their end, for example of a traveling root. frame_rate: of the keys added in the blend,
+    from its start; None for even spacing.
     Raises RangeError unless 0 < blend ≤ the clip's duration.
     """
     chosen = track_indices(clip, tracks)
@@ -69,7 +70,10 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None) -> C
         raise RangeError(
             f"`blend` is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)"
         )
-    return Clip(clip.name, tuple(_close(t, clip, blend) if i in chosen else t for i, t in enumerate(clip.tracks)))
+    if frame_rate is not None:
+        check_fps(frame_rate)
+    closed = (_close(t, clip, blend, frame_rate) if i in chosen else t for i, t in enumerate(clip.tracks))
+    return Clip(clip.name, tuple(closed))
 
 
 def _append_key(track: Track, clip: Clip, end: float, *, travels: bool) -> Track:
@@ -96,7 +100,7 @@ def _continue_travel(track: Track, clip: Clip, end: float) -> Floats:
     return _extrapolate(track, track.values[-1], (before + after) / 2, end - clip.end)[None]
 
 
-def _close(track: Track, clip: Clip, blend: float) -> Track:
+def _close(track: Track, clip: Clip, blend: float, frame_rate: float | None) -> Track:
     if len(track.times) == 1:
         return track
     ends = np.array([clip.start, clip.end])
@@ -111,7 +115,7 @@ def _close(track: Track, clip: Clip, blend: float) -> Track:
     change = speed - rates(track, ends[1:], before=True)[0]
     if not gap.any() and not change.any():
         return track
-    times = _times(track, clip.end - blend, clip.end)
+    times = _times(track, clip.end - blend, clip.end, frame_rate)
     if track.in_tangents is not None:
         return _correct_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
     last_piece = float(times[-1] - times[-2])
@@ -179,17 +183,24 @@ def _correct_linear(track: Track, times: Floats, correction: _Correction) -> Tra
     return track.with_keys(times, values)
 
 
-def _times(track: Track, start: float, end: float) -> Floats:
+def _times(track: Track, start: float, end: float, frame_rate: float | None) -> Floats:
     """Return the track's key times with the ends of the blend and, for sparse keys, some between."""
     keys = track.times
     inside = keys[(keys > start) & (keys < end)]
     more = np.array([start, end])
     rotates = track.in_tangents is not None and track.kind is ValueKind.ROTATION  # normalized anew between its keys
     if rotates or len(inside) < MIN_BLEND_KEYS or end - inside[-1] > (end - start) / MIN_BLEND_KEYS:
-        more = np.linspace(start, end, max(2 * MIN_BLEND_KEYS, round((end - start) * BLEND_FPS) + 1))
+        more = _added_times(start, end, frame_rate)
     more = more[distinct_float32(more)]
     more = more[np.abs(more[:, None] - keys).min(axis=1) > min_interval(end, MIN_INTERVAL_S)]
     return np.sort(np.concatenate((keys, more)))
+
+
+def _added_times(start: float, end: float, frame_rate: float | None) -> Floats:
+    if frame_rate is None:
+        return np.linspace(start, end, max(2 * MIN_BLEND_KEYS, round((end - start) * BLEND_FPS) + 1))
+    frames = start + np.arange(int((end - start) * frame_rate) + 1) / frame_rate
+    return np.append(frames[frames < end - 0.5 / frame_rate], end)
 
 
 def _add_correction(track: Track, values: Floats, added: Floats) -> Floats:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 
+from anim.check.advice import MIN_REGULAR_FRACTION
 from anim.check.checked_file import CheckedFile
 from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
+from anim.measure.inspect.frame_rate import GRID_TOLERANCE_FRAMES, estimate_frame_rate, usual_frame_rate
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import analyze_loop
 from anim.model import Clip
@@ -18,6 +21,8 @@ from anim.units import format_number
 
 LOOP_NAME = re.compile(r"(^|[^a-z])(loop|cycle|idle)([^a-z]|$)", re.IGNORECASE)
 BLEND_S = 0.1  # corrected before the end
+MIN_FPS = 20.0  # of the keys added there
+MIN_FRAMES = 2  # in it: the last one has the speed of the first one of the clip
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -42,8 +47,29 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 def _close(clip: Clip, file: CheckedFile) -> Clip:
     root = root_motion_node(file.skeleton, clip)
-    blend = min(BLEND_S, clip.end - clip.start)
-    return close_loop(clip, analyze_loop(file.motion, clip, root=root), root=root, blend=blend)
+    fps = _frame_rate(clip)
+    blend = min(BLEND_S, clip.end - clip.start) if fps is None else _whole_frames(clip, fps)
+    return close_loop(clip, analyze_loop(file.motion, clip, root=root), root=root, blend=blend, frame_rate=fps)
+
+
+def _frame_rate(clip: Clip) -> float | None:
+    """Rate of a grid with all keys of the clip; None without one. Keys added on it leave nothing for GA109 to fix."""
+    duration = clip.end - clip.start
+    if (usual := usual_frame_rate(clip.key_times, MIN_FPS)) is not None:
+        fps = usual
+    elif (estimated := estimate_frame_rate(clip.key_times)) is None:
+        fps = round(duration * MIN_FPS) / duration  # the start and the end are its only keys
+    else:
+        fps = estimated.fps if estimated.regular >= MIN_REGULAR_FRACTION else 0.0
+    return fps if duration * fps > MIN_FRAMES - GRID_TOLERANCE_FRAMES else None
+
+
+def _whole_frames(clip: Clip, fps: float) -> float:
+    """Length of a blend of about BLEND_S that starts on a frame, in s."""
+    frames = (clip.end - clip.start) * fps
+    blended = max(BLEND_S * fps, MIN_FRAMES)
+    first = max(math.floor(frames - blended + GRID_TOLERANCE_FRAMES), 0)
+    return min((frames - first) / fps, clip.end - clip.start)
 
 
 RULE = Rule(

@@ -47,6 +47,13 @@ def estimate_frame_rate(times: Floats) -> FrameRate | None:
     return FrameRate(fps, float(_regular(times, np.array([fps]))[0]))
 
 
+def usual_frame_rate(times: Floats, min_fps: float) -> float | None:
+    """Return the slowest usual rate, at least `min_fps`, with all key times (K,) on its grid, else None."""
+    rates = USUAL_FPS[min_fps <= USUAL_FPS]
+    good = np.flatnonzero(_regular(times, rates) == 1)
+    return float(rates[good[0]]) if len(good) else None
+
+
 def _median(values: Floats) -> float:
     """Median; np.median would import the masked arrays, which takes longer than all estimates of a file."""
     ordered = np.sort(values)

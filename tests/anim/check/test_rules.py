@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anim.arrays import Floats
 from anim.check.checked_file import CheckedFile
 from anim.check.find import find_all, find_grouped
 from anim.check.finding import Finding, Occurrence
@@ -25,7 +26,7 @@ from tests.anim.check.cases import (
     steps,
     with_tracks,
 )
-from tests.clips import STEP, clip, track
+from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, track
 from tests.files import glb_of, opened_fixture
 
 CODES = [rule.code for rule in RULES]
@@ -94,6 +95,30 @@ def test_a_clip_that_loops_by_name_may_not_jump_further() -> None:
     values = [0.0, 1.0, 2.0, 3.0]
     assert found(with_tracks(steps(values), name="jump"), "GA107") == []
     assert found(with_tracks(steps(values), name="run_loop"), "GA107")
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        pytest.param(np.array([0.0, 0.5, 1.0, 1.5, 2.0]), id="sparse"),
+        pytest.param(np.arange(31) / 24, id="24 fps"),
+        pytest.param(np.array([0.0, 0.5, 1.0, 1.5, 2.0]) / 1.19, id="no usual rate"),
+        pytest.param(np.array([0.0, 0.73]), id="two keys"),
+        pytest.param(np.append(np.arange(31) / 24, 31.4 / 24), id="ends between frames"),
+    ],
+)
+@pytest.mark.parametrize("tangents", [None, 0.0])
+def test_closing_a_loop_leaves_its_keys_on_frames(times: Floats, tangents: float | None) -> None:
+    """Otherwise GA109 would resample the clip because of the fix of GA107."""
+    values = np.linspace([0.0, 0.0, 0.0], [0.02, 0.0, 0.0], len(times))
+    sides = None if tangents is None else (values * tangents, values * tangents)
+    curve = track("translation", times, values, LINEAR if sides is None else CUBICSPLINE, node=1, tangents=sides)
+    both = RuleSelection(select=("GA107", "GA109"))
+    file = with_tracks(curve)
+    assert found(file, "GA109") == []
+    result = fix_all(checked(file), both, unsafe=True)
+    assert [each.rule.code for each in result.applied] == ["GA107"]
+    assert find_all(checked(result.document), both) == ()
 
 
 def test_a_channel_that_lost_its_pointer_uses_no_extension() -> None:
