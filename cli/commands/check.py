@@ -130,8 +130,9 @@ def command(
 
     --write-baseline keeps the findings of today, by rule, file and part; with --baseline only new ones count.
     Budgets limit bytes, animation_bytes, keys, keys_per_second, seconds, clips, joints, targets, and the error against
-    a source ({path}: the file's path from the folder of the settings; {name}: its name). --budget-report shows the
-    values beside the limits.
+    a source. against takes {path}, the file's path from the folder of the settings, {folder}, {name}, {stem} (the name
+    without extension) and {subfolder}, the folders below those of match: against = "{subfolder}/{stem}.gltf" for
+    match = "build/**". --budget-report shows the values beside the limits.
     --format github prints annotations, sarif is for code scanning, junit for test reports, md for job summaries.
     """
     if explain is not None:

@@ -45,13 +45,13 @@ def expand(output: str, rows: Sequence[Mapping[str, str]], numbers: Sequence[int
     return names
 
 
-def fill_path(output: str, path: str) -> str:
-    """Return an output name with OF_PATHS replaced by those of an input's path.
+def fill_path(output: str, path: str, **others: str) -> str:
+    """Return an output name with OF_PATHS replaced by those of an input's path, and others by their values.
 
     fill_path("build/{folder}/{stem}.gltf", "crowd/a.glb") → "build/crowd/a.gltf"
     """
     pure = PurePath(path)
-    values = {"path": pure.as_posix(), "folder": pure.parent.as_posix(), "name": pure.name, "stem": pure.stem}
+    values = {"path": pure.as_posix(), "folder": pure.parent.as_posix(), "name": pure.name, "stem": pure.stem, **others}
     return PurePath(_filled(output, values)).as_posix()  # "a/./b" → "a/b"
 
 

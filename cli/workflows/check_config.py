@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import glob
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -12,6 +15,7 @@ from anim.check.finding import Severity
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError
 from cli.errors import UsageError
+from cli.io import output_names
 from cli.workflows import config_tables
 
 _KEYS: Mapping[str, config_tables.Keys] = {
@@ -23,9 +27,14 @@ _KEYS: Mapping[str, config_tables.Keys] = {
 }
 
 
+SUBFOLDER = "subfolder"  # placeholder: folders of a file below the fixed part of `match`
+_AGAINST_HELP = "{subfolder}/{name} is the path below the folder of match: 'a/b.glb' of 'build/a/b.glb' for 'build/**'"
+
+
 @dataclass(frozen=True)
 class Budget:
-    """Limits of matching files. error: as text, "0.5mm" or "0.1%"; against: the source, with {path} or {name}."""
+    """Limits of matching files. error: as text, "0.5mm" or "0.1%"; against: the source, with {path}, {folder},
+    {name}, {stem} or {subfolder}."""
 
     match: str
     limits: tuple[tuple[str, float], ...]
@@ -59,13 +68,27 @@ class CheckConfig:
         return next((each for each in self.budgets if matches(relative, each.match)), None)
 
     def source_of(self, path: Path, budget: Budget) -> Path:
-        """Return the file that a file's error is measured against."""
-        return self.folder / budget.against.replace("{path}", self._relative(path)).replace("{name}", path.name)
+        """Return the file that a file's error is measured against.
+
+        Raises UsageError if `against` has placeholders and gives the file itself.
+        """
+        relative = self._relative(path)
+        subfolder = PurePosixPath(relative).parent.relative_to(_fixed_folder(budget.match))
+        source = self.folder / output_names.fill_path(budget.against, relative, subfolder=str(subfolder))
+        if "{" in budget.against and os.path.realpath(source) == os.path.realpath(path):
+            problem = f"`against` of the budget '{budget.match}' is the checked file itself: {relative}"
+            raise UsageError(f"{self.path}: {problem}", help=_AGAINST_HELP)
+        return source
 
     def _relative(self, path: Path) -> str:
         """Path from the folder, "" outside of it."""
         absolute = path.resolve()
         return absolute.relative_to(self.folder).as_posix() if absolute.is_relative_to(self.folder) else ""
+
+
+def _fixed_folder(pattern: str) -> str:
+    """The folders of a pattern before the first part with a wildcard: "build" of "build/**/*.glb"."""
+    return "/".join(takewhile(lambda part: not glob.has_magic(part), pattern.split("/")[:-1])) or "."
 
 
 def matches(path: str, pattern: str) -> bool:
@@ -126,6 +149,10 @@ def _budget(path: Path, entry: Any) -> Budget:
     for key in ("match", *(("against",) if "error" in entry else ())):
         if key not in entry:
             raise UsageError(f"{path}: [[budget]] has no {key}")
+    try:
+        output_names.check_placeholders(entry.get("against", ""), (*output_names.OF_PATHS, SUBFOLDER))
+    except UsageError as error:
+        raise UsageError(f"{path}: `against` of [[budget]] is {error}", help=_AGAINST_HELP) from None
     limits = tuple((name, float(entry[name])) for name in MEASURES if name in entry)
     return Budget(entry["match"], limits, entry.get("error", ""), entry.get("against", ""))
 

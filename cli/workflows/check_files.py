@@ -166,7 +166,7 @@ class FileChecker:
             raise
         except AnimError as error:
             fault = checked_files.fault_of(source_path, error)
-            fault.where = f"{SOURCE} {Path(source_path).relative_to(config.folder).as_posix()}"
+            fault.where = f"{SOURCE} {PurePath(os.path.relpath(source_path, config.folder)).as_posix()}"
             fault.help = f"correct `against` of [[budget]] in {Path(config.path).name}"
             return limited, (fault,)
 

@@ -94,6 +94,9 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
         ('match = "*"\nbytes = nan', "budget.bytes is nan (expected a finite number)"),
         ("bytes = 3", "has no match"),
         ('match = "*"\nerror = "1mm"', "has no against"),
+        ('match = "*"\nerror = "1mm"\nagainst = "a/{file}"', "{file} stands for nothing (expected {path} or"),
+        ('match = "*"\nerror = "1mm"\nagainst = "{path}"', "is the checked file itself: noop.glb"),
+        ('match = "*"\nerror = "1mm"\nagainst = "{folder}/{name}"', "is the checked file itself: noop.glb"),
     ],
 )
 def test_wrong_budgets_are_refused(text: str, words: str, folder: Path, call: Call) -> None:
@@ -101,6 +104,25 @@ def test_wrong_budgets_are_refused(text: str, words: str, folder: Path, call: Ca
     run = call("check", "noop.glb")
     assert (run.code, run.text) == (2, "")
     assert words in run.err
+
+
+@pytest.mark.parametrize(
+    ("match", "against"),
+    [
+        ("build/**", "{subfolder}/{stem}.gltf"),
+        ("build/**/*.glb", "{subfolder}/{stem}.gltf"),
+        ("build/art/*.glb", "art/{subfolder}/{stem}.gltf"),
+        ("**/*.glb", "{subfolder}/../../art/{stem}.gltf"),
+    ],
+)
+def test_sources_of_outputs_in_another_folder(match: str, against: str, folder: Path, call: Call) -> None:
+    for name in ("art", "build/art"):
+        (folder / name).mkdir(parents=True)
+    assert call("convert", "noop.glb", "art/noop.gltf").code == 0
+    assert call("resample", "noop.glb", "build/art/noop.glb", "--fps", "2").code == 0
+    (folder / "gltf-anim.toml").write_text(f'[[budget]]\nmatch = "{match}"\nerror = "1mm"\nagainst = "{against}"\n')
+    run = call("check", "build", "--format", "json", "--select", "GA402")
+    assert (run.code, [each["where"] for each in run.json["findings"]]) == (6, ["error"])
 
 
 def test_a_baseline_is_the_same_from_every_folder(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
