@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 from anim.gltf.io import images
+from anim.gltf.io.source import external_files
 from cli import text
 from cli.io import documents
 from cli.options import common
 from cli.reports import image_notes
+from cli.streams import record_files
 
 
 def command(
@@ -35,6 +37,7 @@ def command(
     with documents.source(input, voice) as source:
         document = source.document
         if embed:
+            record_files(*external_files(source))
             document = images.embed(document, source.folder)
         size = documents.write(document, output, source, dry_run=dry_run, voice=voice)
     if not dry_run and (embed or output == documents.PIPE or not source.is_in_folder(output)):

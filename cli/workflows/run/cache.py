@@ -14,6 +14,7 @@ from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import AnimError
 from anim.files import atomic, resolver
+from cli.workflows.run.stamps import Stamp, stamp_of
 from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
@@ -39,7 +40,7 @@ class CacheRecord:
 class FileHashes:
     """SHA-256 of files, each read once while it stays the same."""
 
-    _known: dict[str, tuple[tuple[int, int], str]] = field(default_factory=dict)
+    _known: dict[str, tuple[Stamp, str]] = field(default_factory=dict)
 
     def hash(self, path: str) -> str:
         """Return the hash of a file, "" if it can't be read."""
@@ -119,15 +120,6 @@ def result_key(recipe: str, steps: tuple[Step, ...], path: str, digest: str) -> 
 def hash_of(data: Bytes) -> str:
     """Return the SHA-256 of bytes."""
     return hashlib.sha256(data.data).hexdigest()
-
-
-def stamp_of(path: str | Path) -> tuple[int, int] | None:
-    """Return size and modification time of a file; None without one."""
-    try:
-        found = os.stat(path)
-    except (OSError, ValueError):
-        return None
-    return found.st_size, found.st_mtime_ns
 
 
 def _hash_json(value: object) -> str:

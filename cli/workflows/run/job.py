@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import shlex
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +16,14 @@ from anim.arrays import Bytes
 from anim.errors import AnimError, UnsupportedError, not_written
 from anim.gltf.document import json_array
 from anim.gltf.io import container, images
-from anim.gltf.io.source import open_bytes, write_file
+from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
 from cli import errors, main
 from cli.io.documents import PIPE
+from cli.reports import image_notes
 from cli.streams import StepStreams, use_streams
-from cli.workflows.run.cache import FileHashes, ResultCache, stamp_of
+from cli.text import Reporter
+from cli.workflows.run.cache import FileHashes, ResultCache
+from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 from cli.workflows.run.steps import Step
 
 EMPTY: Bytes = np.empty(0, np.uint8)
@@ -46,16 +49,19 @@ class Job:
 
 @dataclass(frozen=True)
 class JobResult:
-    """Result of a job. code: exit code. messages: lines of the steps, errors last. size: bytes of the product, a GLB.
+    """Result of a job. code: exit code. messages: lines of the steps, errors last. size: bytes of the output.
 
-    stamp: size and modification time of the input when the job began. seconds: of work.
+    stamp: size and modification time of the input when the job began. seconds: of work. input_size: bytes of the input
+    with its buffers, as `size` has those of the output. files: stamps by path of all other files read and written.
     """
 
     code: int
     messages: tuple[str, ...] = ()
     size: int = 0
-    stamp: tuple[int, int] | None = None
+    stamp: Stamp | None = None
     seconds: float = 0.0
+    input_size: int = 0
+    files: Mapping[str, Stamp | None] = field(default_factory=dict)
 
 
 def run_job(job: Job) -> JobResult:
@@ -63,21 +69,23 @@ def run_job(job: Job) -> JobResult:
     began = time.perf_counter()
     stamp = stamp_of(job.folder / job.input)
     streams = StepStreams(job.input, EMPTY, job.folder)
-    product = EMPTY
+    size, others = 0, dict[str, Stamp | None]()
 
     def work() -> int:
-        nonlocal product
+        nonlocal size, others
         _check_version(job.version)
         code, files, product = run_steps(job, streams)
         if code == errors.DONE:
             if job.cache is not None and stamp == stamp_of(job.folder / job.input):  # else of other bytes than its key
                 store(job, product, files)
-            write_output(job, product)
+            size = write_output(job, product)
+            others = stamp_companions(job, product, files)
         return code
 
     with use_streams(streams):
         code = errors.run_guarded(work)
-    return JobResult(code, tuple(streams.messages), len(product), stamp, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return JobResult(code, tuple(streams.messages), size, stamp, seconds, input_size(job), others)
 
 
 def _check_version(version: str) -> None:
@@ -116,22 +124,54 @@ def store(job: Job, product: Bytes, files: Sequence[Path]) -> None:
     ResultCache(job.cache).store(job.key, product, others, is_plain=is_plain)
 
 
-def write_output(job: Job, product: Bytes) -> None:
-    """Write the GLB of the last step as the output, with external images copied beside it. Raises AnimError.
+def write_output(job: Job, product: Bytes) -> int:
+    """Write the GLB of the last step as the output, with external images copied beside it; return its size in bytes.
 
-    The same bytes are not written again.
+    The same bytes are not written again. Raises AnimError.
     """
     path = job.folder / job.output
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise not_written(str(path.parent), error) from None
-    source = replace(open_bytes(product, job.output), folder=(job.folder / job.input).parent)
+    folder = (job.folder / job.input).parent
+    source = replace(open_bytes(product, job.output), folder=folder)
     try:
-        write_file(source.document, str(path), source, unchanged=product)
+        size = write_file(source.document, str(path), source, unchanged=product)
     except AnimError as error:
         error.problem = error.problem.replace(str(path), job.output)
         raise
+    if not source.is_in_folder(str(path)):
+        for line in image_notes.notes(source.document, folder, copied=True):
+            Reporter().info(line)
+    return size
+
+
+def stamp_companions(job: Job, product: Bytes, read: Iterable[str | Path]) -> dict[str, Stamp | None]:
+    """Return the stamps of all files of a job besides input and output: those read, and buffers and images written.
+
+    product: GLB of the last step, whose images come from the input's folder. read: files that the steps read.
+    """
+    images = list(external_files(replace(open_bytes(product, job.output), folder=(job.folder / job.input).parent)))
+    written = external_files(open_file(str(job.folder / job.output))) if images or is_text(job.output) else ()
+    stamps = stamp_files(job.folder, [*read, *images, *written])
+    return {path: stamp for path, stamp in stamps.items() if path not in map(os.path.normpath, (job.input, job.output))}
+
+
+def input_size(job: Job) -> int:
+    """Return the bytes of the input with its buffers, 0 if it can't be read."""
+    path = job.folder / job.input
+    if is_text(job.input):
+        try:
+            return open_file(str(path)).size
+        except AnimError:
+            pass
+    return (stamp_of(path) or (0, 0))[0]
+
+
+def is_text(path: str) -> bool:
+    """Return whether a path is that of a .gltf, which has its buffers in other files."""
+    return path.lower().endswith(".gltf")
 
 
 def argument_of(path: str) -> str:

@@ -11,7 +11,7 @@ from typing import IO, Any
 
 from anim import __version__
 from anim.files import atomic
-from cli.workflows.run.cache import stamp_of
+from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 
 NAME = "journal.jsonl"
 STATUSES = MADE, CACHED, DONE_BEFORE, FAILED = "made", "cached", "done before", "failed"
@@ -21,7 +21,10 @@ STATUSES = MADE, CACHED, DONE_BEFORE, FAILED = "made", "cached", "done before", 
 class JournalEntry:
     """One file. recipe: hash of its steps. stamps: size and modification time of input and output.
 
-    status: MADE, CACHED, DONE_BEFORE (in an earlier run that is resumed) or FAILED; messages: of failed files.
+    files: stamps by path of the other files that were read and written, such as buffers and images; None in a journal
+    of an earlier version. size: bytes of the output with its buffers.
+    status: MADE, CACHED, DONE_BEFORE (in an earlier run that is resumed) or FAILED.
+    messages: of failed files, else warnings and notes.
     """
 
     input: str
@@ -31,8 +34,9 @@ class JournalEntry:
     code: int = 0
     seconds: float = 0.0
     size: int = 0
-    input_stamp: tuple[int, int] | None = None
-    output_stamp: tuple[int, int] | None = None
+    input_stamp: Stamp | None = None
+    output_stamp: Stamp | None = None
+    files: dict[str, Stamp | None] | None = None
     messages: tuple[str, ...] = ()
 
 
@@ -53,13 +57,15 @@ class Journal:
             self.file.write(json.dumps(value, ensure_ascii=False) + "\n")
             self.file.flush()
 
-    def is_done(self, folder: Path, input: str, output: str, recipe: str) -> bool:
-        """Return whether an earlier run made an output by these steps, and neither file has changed since."""
+    def find_done(self, folder: Path, input: str, output: str, recipe: str) -> JournalEntry | None:
+        """Return the entry of an earlier run that made an output by these steps, if no file has changed since."""
         entry = self.earlier.get((input, output))
         if entry is None or entry.status == FAILED or entry.recipe != recipe or entry.output_stamp is None:
-            return False
+            return None
         stamps = stamp_of(folder / input), stamp_of(folder / output)
-        return stamps == (entry.input_stamp, entry.output_stamp)
+        if stamps != (entry.input_stamp, entry.output_stamp) or entry.files is None:
+            return None
+        return entry if stamp_files(folder, entry.files) == entry.files else None
 
 
 @contextmanager
@@ -87,11 +93,15 @@ def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
     for line in lines:
         with suppress(ValueError, TypeError):
             value = json.loads(line)
-            stamps = {key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value}
+            stamps: dict[str, Any] = {
+                key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value
+            }
+            if value.get("files") is not None:
+                stamps["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
             entry = JournalEntry(**{**value, **stamps})
             entries[entry.input, entry.output] = entry
     return entries
 
 
-def _stamp(value: Any) -> tuple[int, int] | None:
+def _stamp(value: Any) -> Stamp | None:
     return None if value is None else (int(value[0]), int(value[1]))

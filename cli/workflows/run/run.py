@@ -14,11 +14,21 @@ from cli import errors
 from cli.errors import run_guarded
 from cli.progress import Progress
 from cli.streams import StepStreams, use_streams
-from cli.text import Reporter, format_bytes, format_change, format_duration, plural
-from cli.workflows.run.cache import FileHashes, ResultCache, recipe_key, result_key, stamp_of
+from cli.text import Reporter, format_change, format_duration, plural
+from cli.workflows.run.cache import FileHashes, ResultCache, recipe_key, result_key
 from cli.workflows.run.cluster import Cluster
-from cli.workflows.run.job import EMPTY, Job, JobResult, run_job, write_output
+from cli.workflows.run.job import (
+    EMPTY,
+    Job,
+    JobResult,
+    input_size,
+    is_text,
+    run_job,
+    stamp_companions,
+    write_output,
+)
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
+from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 from cli.workflows.run.steps import Step
 from cli.workflows.run.workers import local_pool, run_jobs
 
@@ -86,8 +96,12 @@ class RecipeRun:
         for each in self.jobs:
             job = replace(each, cores=1 if self.cluster else max(1, self.processes // self._count))
             recipe = self._recipe(job)
-            if self.journal.is_done(job.folder, job.input, job.output, recipe):
-                self._record(job, JobResult(errors.DONE, stamp=stamp_of(job.folder / job.input)), DONE_BEFORE)
+            done = self.journal.find_done(job.folder, job.input, job.output, recipe)
+            if done is not None:
+                before = input_size(job) if self.voice.verbose else 0  # for the line of --verbose
+                files = done.files or {}
+                result = JobResult(errors.DONE, done.messages, done.size, done.input_stamp, 0.0, before, files)
+                self._record(job, result, DONE_BEFORE)
             elif self.cache is None:
                 yield job
             else:
@@ -107,15 +121,24 @@ class RecipeRun:
             return None
         stamp = stamp_of(job.folder / job.input)
         output = os.path.join(job.folder, job.output)
-        if record.is_plain and not output.lower().endswith(".gltf") and self._hashes.hash(output) == record.product:
-            return JobResult(errors.DONE, (), record.size, stamp)
+        if record.is_plain and not is_text(output) and self._hashes.hash(output) == record.product:
+            others = stamp_files(job.folder, record.files)
+            return JobResult(errors.DONE, (), record.size, stamp, 0.0, input_size(job), others)
         product = cache.product(record)
         if product is None:
             return None
         streams = StepStreams(job.input, EMPTY, job.folder)
+        size, files = 0, dict[str, Stamp | None]()
+
+        def write() -> None:
+            nonlocal size, files
+            size = write_output(job, product)
+            files = stamp_companions(job, product, record.files)
+
         with use_streams(streams):
-            code = run_guarded(lambda: write_output(job, product))
-        return JobResult(code, tuple(streams.messages), record.size, stamp, time.perf_counter() - began)
+            code = run_guarded(write)
+        seconds = time.perf_counter() - began
+        return JobResult(code, tuple(streams.messages), size, stamp, seconds, input_size(job), files)
 
     def _recipe(self, job: Job) -> str:
         if job.steps not in self._recipes:
@@ -141,18 +164,24 @@ class RecipeRun:
                 result.size,
                 result.stamp,
                 None if status == FAILED else stamp_of(job.folder / job.output),
-                result.messages if status == FAILED else (),
+                dict(result.files),
+                result.messages if status == FAILED else tuple(filter(is_notice, result.messages)),
             )
         )
 
     def _report(self, job: Job, result: JobResult, status: str) -> None:
-        """Report a file: its errors and warnings, else a line if it was made; with --verbose all that steps report."""
+        """Report a file: errors, warnings and notes, and a line if it was made; with --verbose all lines of steps."""
         voice = Reporter() if status == FAILED else self.voice
-        for line in result.messages:
-            if status == FAILED or self.voice.verbose or line.startswith("warning: "):
+        for line in result.messages if status != DONE_BEFORE else ():
+            is_shown = line.startswith("warning: ") or (is_notice(line) and not self.voice.quiet)
+            if status == FAILED or self.voice.verbose or is_shown:
                 Reporter().info(line if job.input in line or status == FAILED else f"{job.input}: {line}")
         if status == MADE or (self.voice.verbose and status != FAILED):
-            before = 0 if result.stamp is None else result.stamp[0]
-            sizes = format_change(before, result.size) if result.size else format_bytes(before)
+            sizes = format_change(result.input_size, result.size)
             took = f", {format_duration(result.seconds)}" if status == MADE else f" ({status})"
             voice.info(f"{job.output}  {sizes}{took}")
+
+
+def is_notice(line: str) -> bool:
+    """Return whether a line of a step is a warning or a note."""
+    return line.startswith(("warning: ", "note: "))

@@ -1,0 +1,96 @@
+"""`run`: buffers and images of inputs and outputs, for --resume and in the report."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from tests.cli.running_recipes import journal, write_recipe
+
+RESUME = ("run", "--resume", "--no-cache")
+
+
+@pytest.fixture
+def text_file(folder: Path, call: Call) -> Path:
+    """A folder with crowd/arm.gltf, its buffer and its image, and the recipe."""
+    call("convert", "crowd/arm 1.glb", "crowd/arm.gltf").product()
+    path = folder / "crowd/arm.gltf"
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps({**document, "images": [{"uri": "skin.png"}]}))
+    (folder / "crowd/skin.png").write_bytes(b"\x89PNG")
+    write_recipe(folder, "resample --fps 12", match="crowd/*.gltf", out="build/{stem}.gltf")
+    return folder
+
+
+def flip_end(path: Path) -> None:
+    """Change the last byte of a file."""
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("name", ["crowd/arm.bin", "crowd/skin.png", "build/arm.bin", "build/skin.png"])
+@pytest.mark.parametrize("change", [flip_end, Path.unlink])
+def test_resume_makes_again_what_has_another_buffer_or_image(
+    name: str, change: Callable[[Path], None], text_file: Path, call: Call
+) -> None:
+    call("run", "--no-cache").product()
+    assert "1 file: 1 done before" in call(*RESUME).err
+    output = text_file / name
+    before = output.read_bytes()
+    change(output)
+    run = call(*RESUME)
+    if (name, change) == ("crowd/arm.bin", Path.unlink):
+        assert run.code == 3
+        return
+    assert "1 file: 1 made" in run.err
+    if name == "build/arm.bin":
+        (buffer,) = json.loads((text_file / "build/arm.gltf").read_text())["buffers"]
+        assert (text_file / "build" / buffer["uri"]).read_bytes() == before
+    if name.startswith("build"):
+        assert before in [path.read_bytes() for path in (text_file / "build").iterdir()]
+    assert "1 file: 1 done before" in call(*RESUME).err
+
+
+def test_resume_after_a_run_from_the_cache_has_the_same_stamps(text_file: Path, call: Call) -> None:
+    call("run").product()
+    made = journal(text_file)
+    assert set(made[0]["files"]) == {"crowd/arm.bin", "crowd/skin.png", "build/arm.bin", "build/skin.png"}
+    assert "1 file: 1 cached" in call("run").err
+    assert journal(text_file)[0]["files"] == made[0]["files"]
+    flip_end(text_file / "crowd/arm.bin")
+    assert "1 file: 1 made" in call("run", "--resume").err
+
+
+def test_images_that_a_step_embeds_count_for_the_cache(text_file: Path, call: Call) -> None:
+    (text_file / "gltf-anim.toml").unlink()
+    write_recipe(text_file, "convert --embed", match="crowd/*.gltf", out="build/{stem}.glb")
+    call("run").product()
+    before = (text_file / "build/arm.glb").read_bytes()
+    (text_file / "crowd/skin.png").write_bytes(b"\x89PNG, other")
+    assert "1 file: 1 made" in call("run").err
+    assert (text_file / "build/arm.glb").read_bytes() != before
+
+
+def test_the_sizes_of_a_gltf_are_those_of_the_single_command(text_file: Path, call: Call) -> None:
+    sizes = r"[\d.]+ kB → [\d.]+ kB \([^)]*\)"
+    (text_file / "single").mkdir()
+    single = re.search(sizes, call("resample", "crowd/arm.gltf", "single/arm.gltf", "--fps", "12").err)
+    assert single is not None
+    for options in ((), ("-v",), ("-v", "--resume")):
+        assert single[0] in call("run", *options).err.replace("build", "single"), options
+
+
+def test_missing_images_are_noted_and_in_the_journal(text_file: Path, call: Call) -> None:
+    (text_file / "crowd/skin.png").unlink()
+    line = "note: 1 image missing, since no such file can be read (skin.png)"
+    for _ in ("made", "cached"):
+        assert f"crowd/arm.gltf: {line}" in call("run").err
+        assert journal(text_file)[0]["messages"] == [line]
+        (text_file / "build/arm.bin").unlink()
+    assert "note" not in call("run", "-q").err
