@@ -177,13 +177,16 @@ def _report(
     *,
     quiet: bool,
 ) -> int:
-    if format is not Format.TEXT or not quiet:
+    if format is Format.TEXT and quiet:
+        documents.write_text(check_report.error_text(report))
+    else:
         documents.write_text(WRITERS[format](report))
     worst = _worst(report.refused, len(report.files))
     counted = [each for each in report.found if each[1].code != INVALID.code]
     bad = [each for each in counted if each[1].severity.is_at_least(limits[each[0]])]
     if bad and not worst:
-        name, first = bad[0]
+        order = list(Severity)  # most severe first
+        name, first = min(bad, key=lambda each: order.index(each[1].severity))
         more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
         raise CheckError(f"{name}: {first.severity} {first.code} {first.name}: {first.where}: {first.problem}{more}")
     return worst

@@ -46,9 +46,21 @@ class CheckReport:
 
 def text(report: CheckReport) -> str:
     """Return the findings by file and rule, with the advice of each rule, and a summary."""
+    lines = _findings(report.found)
+    lines += ["", summary(report)] if lines else [summary(report)]
+    return "\n".join(map(escape_control, lines)) + "\n"
+
+
+def error_text(report: CheckReport) -> str:
+    """Return only the errors of the text, "" without one: even a quiet check shows them."""
+    lines = _findings([each for each in report.found if each[1].severity is Severity.ERROR])
+    return "".join(f"{escape_control(line)}\n" for line in lines)
+
+
+def _findings(listed: Sequence[FileFinding]) -> list[str]:
     lines: list[str] = []
     previous = None
-    for (path, code), group in groupby(report.found, key=lambda each: (each[0], each[1].code)):
+    for (path, code), group in groupby(listed, key=lambda each: (each[0], each[1].code)):
         if path != previous:
             lines += [*([""] if lines else []), path]
         previous = path
@@ -58,8 +70,7 @@ def text(report: CheckReport) -> str:
         if len(shown) < len(found):
             lines.append(f"           and {len(found) - len(shown)} more of this rule (all: --format json)")
         lines += [f"           {advice}" for advice in dict.fromkeys(each.advice for each in shown)]
-    lines += ["", summary(report)] if lines else [summary(report)]
-    return "\n".join(map(escape_control, lines)) + "\n"
+    return lines
 
 
 def summary(report: CheckReport) -> str:

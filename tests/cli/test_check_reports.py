@@ -117,3 +117,21 @@ def test_junit_counts_a_broken_file_as_an_error_alone(folder: Path, call: Call) 
     assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("2", "0", "1")
     assert len(root.findall(".//error")) == 1
     assert "GA010" in (root.findtext(".//error") or "")
+
+
+def test_a_quiet_check_shows_the_errors(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text('[[budget]]\nmatch = "**"\nbytes = 1\nkeys = 1\n')
+    run = call("check", ".", "-q", "--fail-on", "info")
+    assert run.code == 6
+    listed = [line.split()[:3] for line in run.text.splitlines() if line.startswith("  error")]
+    assert listed == [["error", "GA402", "over-budget"]] * 4
+    assert "warning" not in run.text
+    assert "info" not in run.text
+    assert run.err.startswith("gltf-anim: crowd/arm 1.glb: error GA402 over-budget: bytes: ")
+    assert call("check", "noop.glb", "-q", "--select", "GA1").text == ""
+
+
+def test_the_line_on_stderr_is_about_the_worst_finding(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text('[[budget]]\nmatch = "noop.glb"\nbytes = 1\n')
+    run = call("check", "noop.glb", "--fail-on", "info")
+    assert run.err.startswith("gltf-anim: noop.glb: error GA402 over-budget: bytes: ")
