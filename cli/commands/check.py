@@ -128,7 +128,8 @@ def command(
         error = "0.5mm"
         against = "source/{path}"
 
-    --write-baseline keeps the findings of today, by rule, file and part; with --baseline only new ones count.
+    --write-baseline keeps the findings of today, by rule, file and part; with --baseline only new ones count. Those of
+    files that are not checked, and still exist, stay in it.
     Budgets limit bytes, animation_bytes, keys, keys_per_second, seconds, clips, joints, targets, and the error against
     a source. against takes {path}, the file's path from the folder of the settings, {folder}, {name}, {stem} (the name
     without extension) and {subfolder}, the folders below those of match: against = "{subfolder}/{stem}.gltf" for
@@ -160,11 +161,14 @@ def command(
         documents.write_text(check_report.budget_table(checker.headroom))
         return _worst(checker.refused, len(checker.files))
     if write_known is not None:
-        documents.write_text(baseline.dump(checker.found, _relative_to(write_known)), write_known)
-        voice.info(f"{write_known}  {len(checker.found)} findings")
+        kept = _unchecked(_written_baseline(write_known), checker.files, write_known)
+        documents.write_text(baseline.dump(checker.found, _relative_to(write_known), kept), write_known)
+        others = f", {kept.total()} kept of files that were not checked" if kept else ""
+        voice.info(f"{write_known}  {len(checker.found)} findings{others}")
         return _worst(checker.refused, len(checker.files))
     report = CheckReport(checker.files, checker.found, checker.refused)
     if expected is not None and known is not None:
+        expected -= _unchecked(expected, report.files, known)
         new, gone = baseline.split(report.found, expected, _relative_to(known))
         report = replace(report, found=new, known=len(report.found) - len(new), gone=sorted(gone.items()))
     return _report(report, checker.limits, format, quiet=quiet)
@@ -222,6 +226,21 @@ def _relative_to(path: str) -> Callable[[str], str]:
     """Names of files as a baseline has them: relative to its folder, wherever the command is run."""
     folder = Path.cwd() if path == documents.PIPE else Path(path).resolve().parent
     return lambda name: name if name == documents.called(documents.PIPE) else _relative(Path(name).resolve(), folder)
+
+
+def _unchecked(known: Counter[str], files: Sequence[str], path: str) -> Counter[str]:
+    """Counts in a baseline of other files than the checked ones: a hook checks only files that changed."""
+    stdin, folder = documents.called(documents.PIPE), Path(path).resolve().parent
+    checked = set(map(_relative_to(path), files))
+    return baseline.unchecked(known, checked, lambda name: name == stdin or os.path.isfile(folder / name))
+
+
+def _written_baseline(path: str) -> Counter[str]:
+    """Counts in a baseline that is to be replaced; none if there is no baseline at `path`."""
+    try:
+        return _load_baseline(path) if path != documents.PIPE and os.path.isfile(path) else Counter()
+    except FormatError:
+        return Counter()
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -55,10 +55,30 @@ def test_only_what_is_new_counts_with_a_baseline(folder: Path, call: Call) -> No
     assert run.code == 0
     assert run.json["findings"] == []
     run = call("check", "crowd/arm 1.glb", "--baseline", "known.json", "--format", "json")
+    assert run.json["gone"] == {}  # as noop.glb is not checked
+    (folder / "noop.glb").unlink()
+    run = call("check", "crowd/arm 1.glb", "--baseline", "known.json", "--format", "json")
     assert run.json["gone"]
     (folder / "known.json").write_text("[]")
-    run = call("check", "noop.glb", "--baseline", "known.json")
+    run = call("check", "crowd", "--baseline", "known.json")
     assert (run.code, run.err) == (3, "gltf-anim: known.json: is no baseline (expected JSON of --write-baseline)\n")
+
+
+def test_a_baseline_keeps_what_it_knows_of_files_that_are_not_checked(folder: Path, call: Call) -> None:
+    call("check", ".", "--write-baseline", "known.json")
+    before = (folder / "known.json").read_text()
+    (folder / "noop.glb").rename(folder / "b: noop.glb")
+    call("check", ".", "--write-baseline", "known.json")
+    renamed = (folder / "known.json").read_text()
+    assert renamed.replace("b: noop.glb", "noop.glb") == before  # without a line of the old name
+    run = call("check", "crowd", "--write-baseline", "known.json")
+    assert (folder / "known.json").read_text() == renamed
+    assert "kept of files that were not checked" in run.err
+    run = call("check", "crowd", "--baseline", "known.json", "--format", "json")
+    assert (run.json["findings"], run.json["gone"]) == ([], {})
+    (folder / "b: noop.glb").unlink()
+    call("check", "crowd", "--write-baseline", "known.json")
+    assert "noop.glb" not in (folder / "known.json").read_text()
 
 
 def test_settings_in_the_help_are_toml(call: Call) -> None:
