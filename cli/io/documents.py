@@ -92,12 +92,13 @@ def write(
     unchanged: Bytes | None = None,
     dry_run: bool = False,
     voice: Reporter = AUDIBLE,
+    in_place: bool = False,
 ) -> int:
     """Write a document to a file or, for "-", as a GLB to stdout; return its size in bytes.
 
     Files are written as by `anim.gltf.io.source.write_file`. source: the document's input. unchanged: bytes of the
     same document (`Source.bytes_of`), written unchanged if they fit the output. voice: reports buffer files of a
-    replaced .gltf that stay.
+    replaced .gltf that stay. in_place: the user named no output: then that is a warning, even when quiet.
     """
     if path != PIPE:
         return write_file(
@@ -106,12 +107,19 @@ def write(
             source,
             unchanged=unchanged,
             dry_run=dry_run,
-            note=lambda words: voice.info(f"note: {tables.escape_control(words)}"),
+            note=lambda words: _report_unused(tables.escape_control(words), voice, in_place=in_place),
         )
     content = glb_chunks(document, unchanged)
     if not dry_run:
         write_bytes(content, path)
     return sum(len(piece) for piece in content)
+
+
+def _report_unused(words: str, voice: Reporter, *, in_place: bool) -> None:
+    if in_place:
+        voice.warn(words)
+    else:
+        voice.info(f"note: {words}")
 
 
 def write_bytes(pieces: Iterable[Bytes], path: str) -> None:

@@ -184,7 +184,7 @@ class FileChecker:
                 reason = each.problem or f"a vertex would move by {format_length(each.error_m)}"
                 self.voice.warn(f"{source.name}: {each.rule.code} {each.rule.name} is not fixed: {reason}")
             if result.applied:
-                documents.write(result.document, path, source, dry_run=self.dry_run, voice=self.voice)
+                documents.write(result.document, path, source, dry_run=self.dry_run, voice=self.voice, in_place=True)
                 fixes = ", ".join(
                     f"{each.count} {each.rule.code} {each.rule.name} (error {format_length(each.error_m)})"
                     for each in result.applied

@@ -65,3 +65,16 @@ def test_a_file_that_cannot_be_fixed_stays_and_the_others_are_fixed(
     run = call("check", "noop.glb", "--fix", "-q")
     assert (run.code, run.err) == (0, "warning: noop.glb is not fixed: has an extension that names its keys\n")
     assert (folder / "noop.glb").read_bytes() == before
+
+
+@pytest.mark.parametrize("options", [(), ("-q",)])
+def test_a_buffer_that_a_fix_leaves_unused_is_a_warning(options: tuple[str, ...], folder: Path, call: Call) -> None:
+    """Readers of the old file need the old buffer, so the new one has another name."""
+    assert call("convert", "noop.glb", "noop.gltf").code == 0
+    (folder / "noop.bin").rename(folder / "noop_data.bin")
+    text = (folder / "noop.gltf").read_text()
+    assert '"noop.bin"' in text
+    (folder / "noop.gltf").write_text(text.replace('"noop.bin"', '"noop_data.bin"'))
+    run = call("check", "noop.gltf", "--fix", *options)
+    problem = "'noop_data.bin' is not used by noop.gltf any more; delete it if nothing else needs it"
+    assert f"warning: {problem}\n" in run.err
