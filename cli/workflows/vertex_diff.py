@@ -105,7 +105,8 @@ def _of_documents(
 ) -> tuple[str, VertexMotion, VertexMotion]:
     """Name of the clip, and the motions of a source and of its bake, which has one clip."""
     (played,) = reader.clips(baked[1])[:1] or (Clip("", ()),)
-    clip = _clip(*source, globs or ([played.name] if played.name in reader.names(source[1]) else []))
+    same = [f"#{i}" for i, name in enumerate(reader.names(source[1])) if name == played.name]  # the name can be empty
+    clip = _clip(*source, globs or same)
     sides = ((source[0].scene_of(), clip), (baked[0].scene_of(), played))
     first, second, missing = pair_documents(*sides)
     if missing:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from tests.cli.conftest import Call, Find
 from tests.cli.running import help_line, refusal
+from tests.files import glb_of, opened_fixture
 from tests.textured import textured
 
 FORMATS = ["npz", "pc2", "mdd", "usdc", "usdz", "glb"]
@@ -84,3 +86,13 @@ def test_refusals(call: Call, source: Path, fixture: Find) -> None:
     assert "--player does not apply to caches" in refusal(call("diff", source, out, "--player", "three"), 2)
     assert "the meshes of the source have 530" in refusal(call("diff", fixture("arm"), out, "--clip", "bend"), 2)
     assert call("diff", out, out, "--fail-above", "0").code == 0
+
+
+def test_a_clip_without_name_is_compared_with_its_bake(call: Call, tmp_path: Path) -> None:
+    document = opened_fixture("arm")
+    clips = [{key: value for key, value in document.json["animations"][0].items() if key != "name"}]
+    source, out = tmp_path / "source.glb", tmp_path / "out.glb"
+    source.write_bytes(glb_of(replace(document, json={**document.json, "animations": clips})))
+    assert call("bake", source, out, "--fps", 64).code == 0
+    for files in ((source, out), (out, source)):
+        assert 0 < call("diff", *files, "--format", "json").json["max_error_m"] < 1e-2
