@@ -18,7 +18,7 @@ from cli.text import Reporter
 from cli.workflows.run import cache as caching
 from cli.workflows.run import journal as journals
 from cli.workflows.run.cluster import connect_cluster
-from cli.workflows.run.emit import SCRIPTS
+from cli.workflows.run.emit import SCRIPTS, readable_jobs
 from cli.workflows.run.plan import plan_jobs
 from cli.workflows.run.recipe import chosen_recipes, read_recipes
 from cli.workflows.run.run import RecipeRun
@@ -97,8 +97,10 @@ def command(
     book = read_recipes(config)
     planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), named=bool(recipe))
     if emit is not None:
-        documents.write_text(SCRIPTS[emit.value](planned))
-        return errors.DONE
+        readable, code = readable_jobs(planned)
+        if readable:
+            documents.write_text(SCRIPTS[emit.value](readable))
+        return code
     folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
     results = caching.ResultCache(folder)
     results.prepare()

@@ -67,6 +67,36 @@ def test_images_that_a_pipe_would_lose_are_refused(folder: Path, call: Call) -> 
     assert "its image 'skin.png' is another file" in refusal(call("run", "--emit", "shell"), 2)
 
 
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_broken_input_is_named_and_left_out(tool: str, folder: Path, call: Call) -> None:
+    (folder / "crowd/arm 1.glb").rename(folder / "crowd/arm.glb")
+    (folder / "crowd/bad.glb").write_bytes((folder / "crowd/arm.glb").read_bytes()[:500])
+    write_recipe(folder, "resample --fps 12")
+    run = call("run", "--emit", tool)
+    assert run.code == 3
+    assert "gltf-anim: crowd/bad.glb: GLB is truncated" in run.err
+    assert "build/crowd/arm.glb" in run.text
+    assert "bad" not in run.text
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_names_that_commands_take_for_placeholders_are_refused(tool: str, folder: Path, call: Call) -> None:
+    (folder / "crowd/arm 1.glb").rename(folder / "crowd/{x}.glb")
+    write_recipe(folder, "resample --fps 12")
+    assert "1 file: 1 made" in call("run").err
+    assert "build/crowd/{x}.glb: {x} stands for nothing" in refusal(call("run", "--emit", tool), 2)
+
+
+@pytest.mark.parametrize("shell", ["sh", "dash", "bash"])
+def test_any_shell_runs_the_script_for_bash(shell: str, folder: Path, call: Call) -> None:
+    if shutil.which(shell) is None:
+        pytest.skip(f"{shell} is not installed")
+    write_recipe(folder, "resample --fps 12")
+    (folder / "script").write_bytes(call("run", "--emit", "shell").product())
+    subprocess.run([shell, "script"], cwd=folder, env=ENVIRONMENT, check=True, capture_output=True)
+    assert (folder / "build/crowd/arm 1.glb").is_file()
+
+
 def test_check_applies_the_rules_to_outputs(folder: Path, call: Call) -> None:
     write_recipe(folder, "resample --fps 12")
     run = call("run", "--check")

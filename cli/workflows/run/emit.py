@@ -5,24 +5,28 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import PurePosixPath
 from typing import TypeAlias
 
+from anim.errors import AnimError
 from anim.gltf.document import json_array
 from anim.gltf.io.images import external_uri
 from anim.gltf.io.source import buffer_files, open_file
-from cli.errors import PROGRAM, UsageError
+from cli.errors import DONE, PROGRAM, UsageError, run_guarded
+from cli.io import output_names
 from cli.workflows.run.job import Job, argument_of
 from cli.workflows.run.steps import EDITING, Step
 
 HEADER = f"# made by `{PROGRAM} run --emit`"
+IN_BASH = '[ -n "${BASH_VERSION-}" ] || exec bash "$0"  # for bash: `sh` has no pipefail everywhere'
 EMBED = "--embed"
 Escape: TypeAlias = Callable[[str], str]  # of a text in a rule
 
 
 def shell_script(jobs: Sequence[Job]) -> str:
     """Return a script for bash, a line a file."""
-    lines = ["#!/usr/bin/env bash", HEADER, "set -euo pipefail", f"cd {shlex.quote(str(jobs[0].folder))}"]
+    lines = ["#!/usr/bin/env bash", HEADER, IN_BASH, "set -euo pipefail", f"cd {shlex.quote(str(jobs[0].folder))}"]
     folders = sorted({PurePosixPath(job.output).parent.as_posix() for job in jobs})
     lines.append(f"mkdir -p -- {shlex.join(folders)}")
     for job in jobs:
@@ -60,6 +64,22 @@ def ninja_file(jobs: Sequence[Job]) -> str:
         command = _pipeline(job, "$in", "$out", escape=lambda text: text.replace("$", "$$"))
         texts.append(f"rule {name}\n  command = {command}\n  description = $out\n")
     return "\n".join([HEADER, *texts, *builds])
+
+
+def readable_jobs(jobs: Sequence[Job]) -> tuple[list[Job], int]:
+    """Return the jobs with readable inputs, and the largest exit code of the others, whose errors are reported."""
+    codes = [run_guarded(partial(_open_input, job)) for job in jobs]
+    return [job for job, code in zip(jobs, codes, strict=True) if code == DONE], max(codes, default=DONE)
+
+
+def _open_input(job: Job) -> None:
+    """Open the glTF input of a job. Raises AnimError with its name, and UsageError for a name of commands' own use."""
+    output_names.check_placeholders(job.output)
+    if job.steps[0].command[0] in EDITING:
+        try:
+            open_file(str(job.folder / job.input))
+        except AnimError as error:
+            raise error.at(job.input, ": ") from None
 
 
 def _pipeline(job: Job, input: str, output: str, escape: Escape = str) -> str:
