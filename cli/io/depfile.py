@@ -46,10 +46,12 @@ def add_output(path: str) -> None:
 def rule(outputs: Sequence[str], inputs: Sequence[str]) -> str:
     """Return a rule in the syntax of make, which ninja reads too: "walk.glb: in.gltf in.bin".
 
-    rule(["a b.glb"], ["in.gltf", "in.bin"]) → "a\\\\ b.glb: in.gltf in.bin"
+    Each input is a target without a rule of its own, so that make goes on when it is removed, as by `gcc -MP`.
+    rule(["a b.glb"], ["in.gltf"]) → "a\\\\ b.glb: in.gltf\\nin.gltf:"
     """
     needed = [each for each in inputs if each not in outputs]
-    return f"{' '.join(map(escape, outputs))}:{''.join(f' {escape(each)}' for each in needed)}\n"
+    rule = f"{' '.join(map(escape, outputs))}:{''.join(f' {escape(each)}' for each in needed)}\n"
+    return rule + "".join(f"{escape(each)}:\n" for each in needed)
 
 
 def escape(path: str) -> str:

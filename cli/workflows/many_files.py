@@ -38,6 +38,8 @@ def edit_named(
         if more:
             help = "the command takes IN and OUT; for more inputs name their outputs by --out"
             raise UsageError(f"got unexpected extra argument ({more[0]})", help=help)
+        if os.path.isdir(input):
+            raise UsageError(f"{input}: is a folder (expected a file)", help="all its files: -o 'out/{path}'")
         edit(input, output)
         return errors.DONE
     if not pattern:

@@ -28,6 +28,11 @@ def character(tmp_path: Path, asset: Find, monkeypatch: pytest.MonkeyPatch) -> P
     return Path("in dir/CesiumMan.gltf")
 
 
+def rule(output: str, *inputs: str) -> str:
+    """A rule, with a target for each input as well."""
+    return f"{output}: {' '.join(inputs)}\n" + "".join(f"{each}:\n" for each in inputs)
+
+
 @pytest.mark.parametrize(
     ("path", "escaped"),
     [("a b.glb", r"a\ b.glb"), ("#1 $2.glb", r"\#1\ $$2.glb"), ("a\\ b", "a\\\\\\ b"), ("C:\\x.glb", "C:\\x.glb")],
@@ -39,27 +44,27 @@ def test_names_are_escaped_as_by_compilers(path: str, escaped: str) -> None:
 def test_all_files_that_are_read_are_named(character: Path, call: Call) -> None:
     call("resample", character, "out.glb", "--fps", "30", "--depfile", "out.d").product()
     files = ("CesiumMan.gltf", "CesiumMan_data.bin", "CesiumMan_img0.jpg")
-    assert Path("out.d").read_text() == "out.glb:" + "".join(rf" in\ dir/{name}" for name in files) + "\n"
+    assert Path("out.d").read_text() == rule("out.glb", *(rf"in\ dir/{name}" for name in files))
 
 
 def test_second_inputs_are_named_too(folder: Path, call: Call, asset: Find) -> None:
     (folder / "hero.glb").write_bytes(built("biped"))
     call("to-euler", "hero.glb", "walk.bvh", "--clip", "walk", "--depfile", "walk.d").product()
-    assert Path("walk.d").read_text() == "walk.bvh: hero.glb\n"
+    assert Path("walk.d").read_text() == rule("walk.bvh", "hero.glb")
     call("from-euler", "walk.bvh", "out.glb", "--onto", "hero.glb", "--depfile", "out.d").product()
-    assert Path("out.d").read_text().split() == ["out.glb:", "walk.bvh", "hero.glb"]
+    assert Path("out.d").read_text() == rule("out.glb", "walk.bvh", "hero.glb")
     call("plot", "hero.glb", "plot.png", "--compare", "out.glb", "--depfile", "plot.d").product()
-    assert Path("plot.d").read_text().split() == ["plot.png:", "hero.glb", "out.glb"]
+    assert Path("plot.d").read_text() == rule("plot.png", "hero.glb", "out.glb")
 
 
 def test_outputs_with_placeholders_are_all_named(folder: Path, call: Call) -> None:
     call("bake", "crowd/arm 1.glb", "{clip}.npz", "--fps", "2", "--depfile", "bake.d").product()
     names, _, inputs = Path("bake.d").read_text().partition(":")
     assert sorted(names.split()) == sorted(path.name for path in folder.glob("*.npz"))
-    assert inputs == " crowd/arm\\ 1.glb\n"
+    assert inputs == " crowd/arm\\ 1.glb\ncrowd/arm\\ 1.glb:\n"
     first = names.split()[0]
     call("convert-cache", first, "out.pc2", "--depfile", "out.d").product()
-    assert Path("out.d").read_text() == f"out.pc2: {first}\n"
+    assert Path("out.d").read_text() == rule("out.pc2", first)
 
 
 @pytest.mark.parametrize(
@@ -107,6 +112,17 @@ def test_make_runs_the_command_again_when_a_buffer_changes(character: Path) -> N
     assert "up to date" in _built("make")
     _change(character.with_name("CesiumMan_data.bin"))
     assert "gltf-anim trim" in _built("make")
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_goes_on_when_an_input_is_gone(folder: Path) -> None:
+    """The files of earlier versions end with "No rule to make target"."""
+    line = "gltf-anim convert noop.glb out.glb --depfile out.d"
+    Path("Makefile").write_text(f"out.glb:\n\t{line}\n-include out.d\n")
+    _built("make")
+    (folder / "noop.glb").rename("walk.glb")
+    Path("Makefile").write_text(Path("Makefile").read_text().replace("noop.glb", "walk.glb"))
+    assert "walk.glb" in _built("make")
 
 
 @pytest.mark.skipif(shutil.which("ninja") is None, reason="ninja is not installed")

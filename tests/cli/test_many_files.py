@@ -107,3 +107,14 @@ def test_an_output_is_never_the_input_of_another_file(crowd: Path, call: Call) -
 def test_options_about_one_file_are_refused(option: str, crowd: Path, call: Call) -> None:
     run = call("optimize", "in", "-o", "out/{path}", option, "x.csv")
     assert (run.code, run.err) == (2, f"gltf-anim: {option} is about one file: leave out --out\n")
+
+
+@pytest.mark.parametrize("command", ["resample --fps 12", "optimize --max-error 1mm"])
+@pytest.mark.parametrize("output", [(), ("out",)])
+def test_a_folder_without_out_is_named_with_the_option(
+    command: str, output: tuple[str, ...], folder: Path, call: Call
+) -> None:
+    name, *options = command.split()
+    run = call(name, "crowd", *output, *options)
+    assert "crowd: is a folder (expected a file)" in refusal(run, 2)
+    assert help_line(run) == "all its files: -o 'out/{path}'"
