@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.running import built
+from tests.cli.running import built, help_line, refusal
 
 COMMANDS = (("resample", "--fps", "30"), ("optimize", "--effort", "fast"))
 
