@@ -55,7 +55,9 @@ WRITERS = {
 def command(
     inputs: Annotated[
         list[str] | None,
-        typer.Argument(metavar="FILE...", help="Files, folders, or patterns; '-' for stdin.", show_default=False),
+        typer.Argument(
+            metavar="FILE...", help="Files, folders ('.'), or patterns; '-' or none: stdin.", show_default=False
+        ),
     ] = None,
     *,
     select: Annotated[
@@ -94,7 +96,10 @@ def command(
     ] = False,
     dry_run: common.DryRun = False,
     budget_report: Annotated[
-        bool, typer.Option("--budget-report", help="Only list the values of budgets with their limits.")
+        bool,
+        typer.Option(
+            "--budget-report", help="Only list the values of budgets with their limits; exit 0 above them too."
+        ),
     ] = False,
     list_rules: Annotated[bool, typer.Option("--list", help="List the rules.")] = False,
     explain: Annotated[
@@ -133,7 +138,8 @@ def command(
     Budgets limit bytes, animation_bytes, keys, keys_per_second, seconds, clips, joints, targets, and the error against
     a source. against takes {path}, the file's path from the folder of the settings, {folder}, {name}, {stem} (the name
     without extension) and {subfolder}, the folders below those of match: against = "{subfolder}/{stem}.gltf" for
-    match = "build/**". --budget-report shows the values beside the limits.
+    match = "build/**". --budget-report only shows the values beside the limits: without it a limit that is exceeded is
+    the error GA402, exit 6.
     --format github prints annotations, sarif is for code scanning, junit for test reports, md for job summaries.
     """
     if explain is not None:
@@ -156,6 +162,9 @@ def command(
         dry_run,
     )
     checker.check_all(inputs or [documents.PIPE])
+    for _, error in () if inputs else checker.refused:
+        if error.problem.startswith("is empty"):  # as in CI, without a pipe
+            error.help = "without FILE, stdin is read; for all files below this folder: gltf-anim check ."
     checker.warn_of_unused_budgets()
     if budget_report:
         documents.write_text(check_report.budget_table(checker.headroom))

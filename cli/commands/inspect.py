@@ -39,7 +39,9 @@ class Format(StrEnum):
 def command(
     inputs: Annotated[
         list[str] | None,
-        typer.Argument(metavar="FILE...", help="Files, folders, or patterns; '-' for stdin.", show_default=False),
+        typer.Argument(
+            metavar="FILE...", help="Files, folders ('.'), or patterns; '-' or none: stdin.", show_default=False
+        ),
     ] = None,
     *,
     format: Annotated[Format, typer.Option("--format", help="Text, or one JSON or CSV document.")] = Format.TEXT,

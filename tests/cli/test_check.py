@@ -101,6 +101,15 @@ def test_files_are_read_from_stdin(call: Call) -> None:
     assert run.json["files"] == ["stdin"]
 
 
+def test_an_empty_stdin_without_a_name_has_a_hint(call: Call) -> None:
+    run = call("check", stdin=b"")
+    problem, help = run.err.splitlines()
+    assert (run.code, problem) == (3, "gltf-anim: stdin: is empty (expected glTF)")
+    assert help == "help: without FILE, stdin is read; for all files below this folder: gltf-anim check ."
+    assert "help:" not in call("check", "-", stdin=b"").err
+    assert "'-' or none: stdin" in " ".join(call("check", "--help").text.split())
+
+
 def test_a_missing_source_leaves_the_other_findings_and_limits(folder: Path, call: Call) -> None:
     (folder / "gltf-anim.toml").write_text(
         '[[budget]]\nmatch = "noop.glb"\nclips = 3\nerror = "1mm"\nagainst = "source/{path}"\n'

@@ -44,6 +44,14 @@ def test_github_shows_ten_errors_also_of_unreadable_files(folder: Path, call: Ca
     assert len(errors) == 10
 
 
+@pytest.mark.parametrize("content", [b"", b"no glTF", built("noop")[:-4]])
+def test_github_shows_one_error_of_a_broken_file(content: bytes, folder: Path, call: Call) -> None:
+    (folder / "bad.glb").write_bytes(content)
+    lines = call("check", "bad.glb", "--format", "github").text.splitlines()
+    (error,) = (line for line in lines if line.startswith("::error"))
+    assert error.startswith("::error file=bad.glb,title=GA010 invalid::")
+
+
 def test_sarif_has_a_region_and_an_encoded_path_in_every_result(folder: Path, call: Call) -> None:
     (folder / "a b#.glb").write_bytes(built("noop"))
     run = call("check", "a b#.glb", "--format", "sarif").json["runs"][0]

@@ -154,3 +154,9 @@ def test_a_baseline_is_the_same_from_every_folder(folder: Path, call: Call, monk
 
 def test_no_budget_is_said(folder: Path, call: Call) -> None:
     assert call("check", "noop.glb", "--budget-report").text == "no checked file has a budget\n"
+
+
+def test_the_exit_code_of_a_budget_report_is_in_the_help(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_text('[[budget]]\nmatch = "noop.glb"\nbytes = 1\n')
+    assert call("check", "noop.glb", "--budget-report").code == 0
+    assert "exit 0 above them too" in " ".join(call("check", "--help").text.split())
