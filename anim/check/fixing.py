@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence
+from anim.check.influence_error import influence_error
 from anim.check.rule import Rule
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError, UnsupportedError
@@ -130,8 +131,10 @@ def _error(before: CheckedFile, after: CheckedFile, numbers: set[int]) -> float:
     """Largest error of a vertex at rest or in any clip, in m. numbers: of the clips that may be gone."""
     names = (*before.skeleton.names, *after.skeleton.names[len(before.skeleton) :])  # renamed nodes are the same ones
     scene = replace(after.scene, skeleton=replace(after.skeleton, names=names))
-    prover = Prover(ErrorMetric(before.scene, scene))
+    metric = ErrorMetric(before.scene, scene)
+    prover = Prover(metric)
     old, new = before.contents.clips, after.contents.clips
     kept = old if len(old) == len(new) else {i: clip for i, clip in old.items() if i not in numbers}
     pairs = [(REST, REST), *zip(kept.values(), new.values(), strict=False)]
-    return float(max(largest_error(prover, one, other).error.max_error for one, other in pairs))
+    by_nodes = max(largest_error(prover, one, other).error.max_error for one, other in pairs)
+    return float(max(by_nodes, influence_error(metric, pairs)))

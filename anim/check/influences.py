@@ -23,8 +23,8 @@ Edit = Callable[[int, Ints, Floats], tuple[Ints, Floats]]  # of a skin: joints a
 def edit_influences(file: CheckedFile, skins: set[int], edit: Edit) -> Document:
     """Return the document with edited joints and weights of the vertices of these skins.
 
-    Accessors that several primitives use are edited once. Vertices that Draco compresses, and those that other skins
-    use too, keep theirs. Weights are written as float32; those that `edit` returns as they are stay.
+    Accessors that several primitives of a skin use are edited once for it. Vertices that Draco compresses, and meshes
+    of other skins too, keep theirs. Weights are written as float32; those that `edit` returns as they are stay.
     """
     document = replace(file.document, json=copy_json(file.json))
     done: dict[tuple[int, ...], dict[str, int | None]] = {}
@@ -33,13 +33,14 @@ def edit_influences(file: CheckedFile, skins: set[int], edit: Edit) -> Document:
         attributes = primitive["attributes"]
         names = _names(attributes)
         old = tuple(attributes[name] for name in names)
-        if old not in done:
+        key = (skin, *old)  # other skins may have other joints at the same indices
+        if key not in done:
             joints = np.concatenate([file.contents.accessors.indices(i) for i in old[::2]], axis=1)
             weights = np.concatenate([file.contents.accessors.floats(i) for i in old[1::2]], axis=1)
-            document, done[old] = _append(document, weights, edit(skin, joints, weights))
+            document, done[key] = _append(document, weights, edit(skin, joints, weights))
             replaced |= set(old)
         kept = {name: attributes.pop(name) for name in names}
-        attributes.update({name: kept[name] if index is None else index for name, index in done[old].items()})
+        attributes.update({name: kept[name] if index is None else index for name, index in done[key].items()})
     return remove_unused_accessors(document, replaced) if done else file.document
 
 
