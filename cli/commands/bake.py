@@ -168,8 +168,7 @@ def command(
             times, label = options.times(each), reader.clip_label(each.name, job.clip or 0)
             if scales is not None:
                 uneven.update(scales.joints(each, times))
-            if fps is None:
-                missed.append((label, inbetween_error(made[job.group], each, times)))
+            missed.append((label, inbetween_error(made[job.group], each, times)))
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
             measured = None if linear is None else MeasuredBake(made[job.group], linear, each, times, progress)
             baked = made[job.group].bake(each, times=times, progress=progress) if measured is None else measured.cache
@@ -193,7 +192,7 @@ def command(
                 voice.verbose_info(f"  {summarize_files(done[-1:], method.value)}")
         at_rest = made[jobs[-1].group].rest
     report_notes(done, voice)
-    bake_notes.frame_gap_note(missed, at_rest, voice)
+    bake_notes.frame_gap_note(missed, at_rest, voice, is_chosen=fps is not None)
     bake_notes.lost_data_notes(deviations, method.value, voice)
     bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)
     took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")

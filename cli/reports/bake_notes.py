@@ -52,17 +52,25 @@ def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) ->
         voice.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")
 
 
-def frame_gap_note(found: Sequence[tuple[str, InbetweenError]], rest: Floats, voice: Reporter) -> None:
+def frame_gap_note(
+    found: Sequence[tuple[str, InbetweenError]], rest: Floats, voice: Reporter, *, is_chosen: bool = False
+) -> None:
     """Warn of the error of linear interpolation between frames, for the clip with the most visible one.
 
-    found: name and inter-frame error of each clip. rest: (V, 3) m, for the diagonal.
+    found: name and inter-frame error of each clip. rest: (V, 3) m, for the diagonal. is_chosen: whether the user chose
+    the frame rate; then it is only a note.
     """
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) if len(rest) else 0.0
     seen = [(missed, name) for name, missed in found if missed.distance > VISIBLE_ERROR_PER_DIAGONAL * diagonal]
     if seen:
         missed, name = max(seen)
         others = f" ({len(seen)} clips are affected)" if len(seen) > 1 else ""
-        voice.warn(
-            f"linear interpolation between frames: error of {text.format_length(missed.distance)} or more at "
-            f"{text.format_instant(missed.time)} of {name}{others} (reduce with --fps)"
+        words = (
+            f"linear interpolation between frames: error of {text.format_length(missed.distance)}"
+            f"{text.format_fraction(missed.distance, diagonal)} or more at {text.format_instant(missed.time)} of "
+            f"{name}{others} (reduce with {'a higher ' if is_chosen else ''}--fps)"
         )
+        if is_chosen:
+            voice.info(f"note: {words}")
+        else:
+            voice.warn(words)

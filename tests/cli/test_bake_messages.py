@@ -135,3 +135,13 @@ def test_meshes_of_other_scenes_are_said(call: Call, tmp_path: Path) -> None:
     render = call("render", "-", tmp_path / "a.png", "--clip", "twist90", "--frames", "1", "-q", stdin=data)
     assert render.err.strip().endswith(expected)
     assert expected not in call("render", "-", tmp_path / "a.png", "--frames", "1", "--hide", "spare", stdin=data).err
+
+
+@pytest.mark.parametrize("ending", ["glb", "npz"])
+def test_the_error_between_frames_is_reported_at_any_rate(ending: str, call: Call, asset: Find, tmp_path: Path) -> None:
+    """Also where keys are as dense as 24 per second; `diff` finds the same."""
+    bake = ("bake", asset("Fox.glb"), tmp_path / f"fox.{ending}", "--clip", "Walk")
+    assert re.search(r"^warning: linear interpolation between frames: error of 1\.3\d m", call(*bake).err, re.MULTILINE)
+    slow = call(*bake, "--fps", "8").err
+    assert re.search(r"^note: linear interpolation between frames: .* higher --fps\)$", slow, re.MULTILINE)
+    assert call(*bake, "--fps", "8", "-q").err == ""

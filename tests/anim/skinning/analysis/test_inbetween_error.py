@@ -55,9 +55,11 @@ def test_an_eased_move_is_off_but_half_way() -> None:
     assert inbetween_error(_rigid(), eased, np.array([0.0, 1])).distance == pytest.approx(3 * np.sqrt(3) / 18, rel=0.05)
 
 
-def test_frames_that_are_close_miss_nothing() -> None:
+def test_frames_at_a_rate_miss_the_arc_between_two() -> None:
     made = _rigid()
-    assert inbetween_error(made, _turning([0, 1], [0, 90]), frame_times(0, 1, fps=30)).distance == 0
+    found = inbetween_error(made, _turning([0, 1], [0, 90]), frame_times(0, 1, fps=30))
+    assert found.distance == pytest.approx(2 * (1 - np.cos(np.radians(1.5))), rel=1e-3)
+    assert inbetween_error(made, _turning([0, 8, 9], [0, 0, 90]), frame_times(0, 9, fps=30)).time > 8
     assert inbetween_error(made, Clip("", ()), np.zeros(1)).distance == 0
 
 
