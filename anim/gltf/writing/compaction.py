@@ -121,13 +121,22 @@ def _accessor_spans(accessor: Json, views: list[Json]) -> Iterator[tuple[int, Ra
         return
     size = buffer_layout.element_size(accessor["componentType"], accessor["type"])
     if "bufferView" in accessor:
-        stride = views[accessor["bufferView"]].get("byteStride", size)
-        yield accessor["bufferView"], _span(accessor, stride * (accessor["count"] - 1) + size)
+        view = views[accessor["bufferView"]]
+        yield accessor["bufferView"], _rows_span(accessor, size, view.get("byteStride", size), view["byteLength"])
     if "sparse" in accessor:
         sparse = accessor["sparse"]
         index_size = buffer_layout.COMPONENT_SIZES[sparse["indices"]["componentType"]]
         yield sparse["indices"]["bufferView"], _span(sparse["indices"], index_size * sparse["count"])
         yield sparse["values"]["bufferView"], _span(sparse["values"], size * sparse["count"])
+
+
+def _rows_span(accessor: Json, size: int, stride: int, view_bytes: int) -> Range:
+    """Span of an accessor's elements; of interleaved ones, whole rows, all of which three.js reads."""
+    start, end = _span(accessor, stride * (accessor["count"] - 1) + size)
+    if stride == size:
+        return start, end
+    first = start // stride * stride
+    return first, max(end, min(first + stride * accessor["count"], view_bytes))
 
 
 def _span(place: Json, length: int) -> Range:

@@ -102,7 +102,7 @@ def test_a_file_without_data_gets_a_buffer() -> None:
 
 @pytest.mark.parametrize("strided", [True, False])
 def test_a_view_shared_with_a_mesh_loses_only_the_clips_bytes(strided: bool) -> None:
-    """times, values and positions lie in one view: interleaved (only what is before the first goes), or in a row."""
+    """times, values and positions are in one view: interleaved (whole rows stay, for three.js), or one after another."""
     values, positions = np.ones((2, 3), "<f4"), np.array([[1, 2, 3], [4, 5, 6]], "<f4")
     parts = [np.array([[0], [1]], "<f4"), values, positions]
     if strided:
@@ -122,8 +122,8 @@ def test_a_view_shared_with_a_mesh_loses_only_the_clips_bytes(strided: bool) -> 
     after = rewritten(document)
     np.testing.assert_array_equal(Accessors(after).raw(2), positions)
     np.testing.assert_array_equal(reader.clips(after)[0].tracks[0].values, values)
-    assert after.json["bufferViews"][0]["byteLength"] == (40 if strided else 24)
-    assert after.json["accessors"][2].get("byteOffset", 0) == 0
+    assert after.json["bufferViews"][0]["byteLength"] == (56 if strided else 24)
+    assert after.json["accessors"][2].get("byteOffset", 0) == (16 if strided else 0)
 
 
 def test_odd_starts_stay_aligned() -> None:
