@@ -92,11 +92,11 @@ def prepare_bake(
         raise NotFoundError("there is no mesh with a skin or morph targets to bake", help=_hint(scene, rigid=rigid))
     starts = np.cumsum([0, *(len(instance.mesh.positions) for instance in chosen)])
     make = _maker(method, blend, bulge_clamp=bulge_clamp)
+    rest = PosedSkeleton.at_rest(scene.skeleton)
     layers = tuple(
-        bind_mesh(scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
+        bind_mesh(rest, scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
         for instance, at in zip(chosen, starts.tolist(), strict=False)
     )
-    rest = PosedSkeleton.at_rest(scene.skeleton)
     return Baker(
         scene,
         layers,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.source_document import placement, retained_channels
-from anim.caches.source_document.bake_source import BakedMesh, BakeSource
+from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span
+from anim.caches.source_document.primitives import BakedVertices, baked_primitives
+from anim.caches.source_document.winding import ReversedFaces, has_negative_determinant
 from anim.gltf.document import Document, Json, copy_json, json_array
 from anim.gltf.writing.new_accessors import NewAccessors, edit_document
 
@@ -32,6 +34,10 @@ class DocumentEdit:
     samplers: list[Json] = field(default_factory=list)
     roots: set[int] = field(default_factory=set)
     replaced: set[int] = field(default_factory=set)
+    _reversed: ReversedFaces = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._reversed = ReversedFaces(self.source.document)
 
     @classmethod
     def of(cls, source: BakeSource, meshes: Sequence[BakedMesh]) -> DocumentEdit:
@@ -39,6 +45,18 @@ class DocumentEdit:
         json = copy_json(source.document.json)
         placement.detach_meshes(json, {each.node for each in meshes} | source.left_out)
         return cls(source, meshes, json, NewAccessors(len(json_array(json, "accessors"))))
+
+    def primitives(
+        self, baked: BakedMesh, vertices: BakedVertices, targets: Mapping[Span, Sequence[dict[str, int]]]
+    ) -> list[Json]:
+        """Return the primitives of a baked mesh, in world space with reversed faces if its node mirrors them."""
+        found = baked_primitives(self.new, self.source.document.json, baked, vertices, targets)
+        if self.source.in_mesh_space or not has_negative_determinant(self.source.document.json, baked.node):
+            return found
+        return [
+            self._reversed.of(self.new, each, span[1] - span[0]) if span[0] < span[1] else each
+            for each, span in zip(found, baked.spans, strict=True)
+        ]
 
     def place(self, baked: BakedMesh, mesh: Json, node: Json) -> int:
         """Add a mesh in place of a baked one, on a node with the properties of `node`; return the node's index."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from anim.caches.formats import flipbook_keys
 from anim.caches.source_document.bake_source import BakeSource, baked_meshes
 from anim.caches.source_document.document_edit import DocumentEdit
-from anim.caches.source_document.primitives import BakedVertices, baked_mesh, baked_primitives
+from anim.caches.source_document.primitives import BakedVertices, baked_mesh
 from anim.errors import UnsupportedError
 from anim.gltf.document import Document, Json
 from anim.gltf.io.container import MAX_GLB_BYTES
@@ -44,7 +44,7 @@ def _pages(edit: DocumentEdit, cache: VertexCache, *, by_scale: bool) -> list[li
             vertices = BakedVertices(positions, normals, tangents, cache.handedness)
             row = []
             for baked in edit.meshes:
-                mesh = baked_mesh(source, baked, baked_primitives(edit.new, source, baked, vertices, {}))
+                mesh = baked_mesh(source, baked, edit.primitives(baked, vertices, {}))
                 row.append(edit.add_mesh(mesh, None if pages else baked.mesh))
             pages.append(row)
     return pages

@@ -5,7 +5,7 @@ from __future__ import annotations
 from anim.arrays import AnyArray
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, baked_meshes
 from anim.caches.source_document.document_edit import DocumentEdit
-from anim.caches.source_document.primitives import BakedVertices, baked_mesh, baked_primitives
+from anim.caches.source_document.primitives import BakedVertices, baked_mesh
 from anim.gltf.document import Document, Json
 from anim.gltf.writing.append import VERTICES
 from anim.model import VertexCache
@@ -42,7 +42,7 @@ def place_lookup_mesh(
     edit = DocumentEdit.of(BakeSource(document, left_out=frozenset(others)), meshes)
     vertices = BakedVertices(rest, normals, None, None)
     for each in meshes:
-        primitives = baked_primitives(edit.new, document.json, each, vertices, {})
+        primitives = edit.primitives(each, vertices, {})
         _add_lookup(edit, each, primitives, lookup, last)
         mesh = edit.add_mesh(baked_mesh(document.json, each, primitives), each.mesh)
         edit.place_group(each, {"mesh": mesh})

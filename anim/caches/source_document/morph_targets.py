@@ -8,7 +8,7 @@ from anim.arrays import AnyArray, Floats
 from anim.caches.formats.morph_encoding import MAX_INT16, MorphEncoding
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span, baked_meshes
 from anim.caches.source_document.document_edit import DocumentEdit
-from anim.caches.source_document.primitives import BakedVertices, baked_mesh, baked_primitives
+from anim.caches.source_document.primitives import BakedVertices, baked_mesh
 from anim.gltf.document import Document, Json
 from anim.gltf.writing.append import VERTICES
 from anim.gltf.writing.new_accessors import NewAccessors
@@ -47,7 +47,7 @@ def replace_by_morphs(
     nodes = []
     for baked in meshes:
         targets = _targets(edit.new, source, baked, form, [normals, tangents], quantize=quantize)
-        primitives = baked_primitives(edit.new, source.document.json, baked, base, targets)
+        primitives = edit.primitives(baked, base, targets)
         mesh = baked_mesh(source.document.json, baked, primitives)
         if len(form.targets):
             mesh["weights"] = [float(weight) for weight in weights[0]]

@@ -1,0 +1,61 @@
+"""Winding of faces whose node mirrors them: players reverse it by the node, so that vertices in world space need it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import Ints
+from anim.gltf.document import Document, Json
+from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.meshes import TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES
+from anim.gltf.validation import hierarchy
+from anim.gltf.writing.append import INDICES
+from anim.gltf.writing.new_accessors import NewAccessors
+
+MAX_UINT16_INDEX = 65534  # 65535 restarts a primitive
+
+
+@dataclass(slots=True)
+class ReversedFaces:
+    """Primitives with reversed faces; those with the same indices have one accessor of them."""
+
+    document: Document
+    _made: dict[tuple[int | None, int, int], int] = field(default_factory=dict)
+
+    def of(self, new: NewAccessors, primitive: Json, vertices: int) -> Json:
+        """Return the primitive with the opposite winding; points and lines are unchanged."""
+        mode = primitive.get("mode", TRIANGLES)
+        if mode not in (TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN):
+            return primitive
+        key = primitive.get("indices"), mode, 0 if "indices" in primitive else vertices
+        if key not in self._made:
+            old = np.arange(vertices) if key[0] is None else Accessors(self.document).indices(key[0])[:, 0]
+            rows = reversed_indices(old, mode)
+            kind = "<u2" if vertices - 1 <= MAX_UINT16_INDEX else "<u4"
+            self._made[key] = new.add(rows.astype(kind)[:, None], target=INDICES)
+        return {**primitive, "indices": self._made[key]}
+
+
+def reversed_indices(indices: Ints, mode: int) -> Ints:
+    """Return indices (n,) of triangles, a strip or a fan for the same faces with the opposite winding."""
+    if mode == TRIANGLES:
+        whole = indices[: len(indices) // 3 * 3].reshape(-1, 3)
+        return whole[:, [0, 2, 1]].reshape(-1)
+    if mode == TRIANGLE_STRIP:
+        return np.concatenate((indices[:1], indices))  # the winding of a strip alternates
+    return np.concatenate((indices[:1], indices[:0:-1]))
+
+
+def has_negative_determinant(json: Json, node: int) -> bool:
+    """Return whether the world matrix of a node at rest has a negative determinant."""
+    parents, sign = hierarchy.parents(json), 1.0
+    while node >= 0:
+        own = json["nodes"][node]
+        if "matrix" in own:
+            sign *= float(np.sign(np.linalg.det(np.reshape(own["matrix"], (4, 4))[:3, :3])))
+        else:
+            sign *= float(np.prod(np.sign(own.get("scale", (1.0, 1.0, 1.0)))))
+        node = parents[node]
+    return sign < 0
