@@ -102,7 +102,7 @@ def test_a_file_without_data_gets_a_buffer() -> None:
 
 @pytest.mark.parametrize("strided", [True, False])
 def test_a_view_shared_with_a_mesh_loses_only_the_clips_bytes(strided: bool) -> None:
-    """times, values and positions are in one view: interleaved (whole rows stay, for three.js), or one after another."""
+    """times, values and positions are in one view: interleaved (whole rows stay), or one after another."""
     values, positions = np.ones((2, 3), "<f4"), np.array([[1, 2, 3], [4, 5, 6]], "<f4")
     parts = [np.array([[0], [1]], "<f4"), values, positions]
     if strided:
