@@ -53,7 +53,7 @@ def _is_unchecked(key: str, checked: Collection[str], exists: Callable[[str], bo
 
 
 def _paths(key: str) -> Iterator[str]:
-    """What can be the path in a fingerprint: paths and names of parts may contain ":" too."""
+    """Possible paths in a fingerprint: paths and names of parts may contain ":" too."""
     rest = key.partition(":")[2][: MAX_PATH_LENGTH + 1]
     return (rest[:i] for i, character in enumerate(rest) if character == ":")
 
