@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Bools, Floats, Ints
 from anim.simulation.cloth.tethers import PATH_TOLERANCE, find_flat_points, point_normals
@@ -25,11 +26,11 @@ MAX_PATH_PER_DISTANCE = 2.0  # lines that are more bent limit nothing
 class Hierarchy:
     """Limits between distant points, the coarsest level first.
 
-    pairs: (D, 2) points, on each level in an order in which neighbors share no point. lengths: (D,) m, of the mesh
-    between them. starts: (L + 1,) index of the first pair of each level.
+    pairs: (D, 2) points, on each level in an order in which neighbors share no point; in 32 bits, since the solver reads 20 for
+    each point. lengths: (D,) m, of the mesh between them. starts: (L + 1,) index of the first pair of each level.
     """
 
-    pairs: Ints
+    pairs: NDArray[np.int32]
     lengths: Floats
     starts: Ints
 
@@ -61,7 +62,7 @@ def build_hierarchy(topology: ClothTopology, x: Floats, pinned: Bools) -> Hierar
         span *= 2
     levels = [level for level in levels[::-1] if len(level[0])]
     starts = np.cumsum([0, *(len(pairs) for pairs, _ in levels)])
-    pairs = np.concatenate([np.zeros((0, 2), np.int64), *(pairs for pairs, _ in levels)])
+    pairs = np.concatenate([np.zeros((0, 2), np.int32), *(pairs for pairs, _ in levels)])
     return Hierarchy(pairs, np.concatenate([np.zeros(0), *(lengths for _, lengths in levels)]), starts)
 
 
@@ -95,7 +96,7 @@ def _pairs(a: Ints, b: Ints, lengths: Floats, flat: Bools, x: Floats, pinned: Bo
     is_first[1:] = (np.diff(low) != 0) | (np.diff(high) != 0)
     pairs = np.stack([low[is_first], high[is_first]], axis=1)
     sweep = color_order(pairs, len(x))
-    return np.ascontiguousarray(pairs[sweep]), limits[is_first][sweep]
+    return np.ascontiguousarray(pairs[sweep], np.int32), limits[is_first][sweep]
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

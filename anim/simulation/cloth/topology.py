@@ -65,10 +65,9 @@ def color_order(pairs: Ints, count: int) -> Ints:
     """Return the order (E,) of pairs (E, 2) of `count` points by greedy colors: those of a color share no point."""
     used, colors = [0] * count, np.empty(len(pairs), np.int64)
     for k, (i, j) in enumerate(pairs.tolist()):
-        taken, color = used[i] | used[j], 0
-        while taken >> color & 1:
-            color += 1
-        colors[k] = color
-        used[i] |= 1 << color
-        used[j] |= 1 << color
+        taken = used[i] | used[j]
+        lowest = ~taken & (taken + 1)  # the bit of the first free color: a point may have thousands of pairs
+        colors[k] = lowest.bit_length() - 1
+        used[i] |= lowest
+        used[j] |= lowest
     return np.argsort(colors, kind="stable")

@@ -7,6 +7,7 @@ Chentanez, Müller-Fischer, Long Range Attachments, 2012, for tethers.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints
 from anim.skinning.kernels.jit import jit
@@ -70,7 +71,7 @@ def limit_elongation(
 
 
 @jit
-def shorten_pairs(p: Floats, w: Floats, pairs: Ints, most: Floats, first: int, end: int) -> None:
+def shorten_pairs(p: Floats, w: Floats, pairs: NDArray[np.int32], most: Floats, first: int, end: int) -> None:
     """Move pairs first … end − 1 of (D, 2) together that are farther apart than their limits (D,) m, in order."""
     for k in range(first, end):
         i, j = pairs[k, 0], pairs[k, 1]

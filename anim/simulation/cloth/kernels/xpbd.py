@@ -7,6 +7,7 @@ Physics Simulation, 2019.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints
 from anim.simulation.cloth.kernels.collisions import push_out
@@ -37,7 +38,7 @@ def step_frame(
     hinge_lengths: Floats,
     anchors: Ints,
     limits: Floats,
-    distant: Ints,
+    distant: NDArray[np.int32],
     distances: Floats,
     levels: Ints,
     outward: Ints,

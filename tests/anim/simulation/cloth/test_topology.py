@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from anim.simulation.cloth.hierarchy import build_hierarchy
 from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.selection import select_vertices
 from anim.simulation.cloth.tethers import tether_lengths
-from anim.simulation.cloth.topology import build_topology
+from anim.simulation.cloth.topology import build_topology, color_order
 from tests.anim.simulation.cloth.cases import (
     sheet,
     simulate,
@@ -116,3 +118,15 @@ def test_a_level_across_a_pleat_is_as_long_as_its_sides() -> None:
     straight = (along[:, 0] == 0) & (levels.lengths < 3 * side)
     np.testing.assert_allclose(levels.lengths[straight], 2 * side, rtol=1e-12)
     assert straight.any()
+
+
+@pytest.mark.parametrize("pairs", [[(0, k) for k in range(1, 3000)], [(k, k + 1) for k in range(50)] * 2])
+def test_colors_are_the_first_free_ones_however_many_pairs_a_point_has(pairs: list[tuple[int, int]]) -> None:
+    used: list[set[int]] = [set() for _ in range(3000)]
+    colors = []
+    for i, j in pairs:
+        colors.append(next(color for color in itertools.count() if color not in used[i] and color not in used[j]))
+        used[i].add(colors[-1])
+        used[j].add(colors[-1])
+    expected = np.argsort(colors, kind="stable")
+    np.testing.assert_array_equal(color_order(np.array(pairs), 3000), expected)
