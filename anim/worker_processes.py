@@ -50,7 +50,7 @@ def follow_parent(lifeline: Lifeline, *, busy: threading.Event | None = None, ma
     if lifeline.inherited is not None:
         lifeline.inherited.close()
     if busy is not None:
-        signal.signal(signal.SIGTERM, _exit)
+        signal.signal(signal.SIGTERM, lambda number, frame: _exit(number, busy))
     threading.Thread(target=_end_with, args=(lifeline.end, busy, max_wait_s), daemon=True).start()
 
 
@@ -65,5 +65,12 @@ def _end_with(lifeline: Connection, busy: threading.Event | None, max_wait_s: fl
     os._exit(1)
 
 
-def _exit(number: int, frame: object) -> None:
+def _exit(number: int, busy: threading.Event) -> None:
+    """Exit by SystemExit while work runs, else at once.
+
+    Between jobs a worker may wait for the lock of the result queue, which another one held when it was killed. The pool
+    would catch SystemExit there and wait again, for ever.
+    """
+    if not busy.is_set():
+        os._exit(128 + number)
     raise SystemExit(128 + number)

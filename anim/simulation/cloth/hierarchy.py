@@ -26,8 +26,9 @@ MAX_PATH_PER_DISTANCE = 2.0  # lines that are more bent limit nothing
 class Hierarchy:
     """Limits between distant points, the coarsest level first.
 
-    pairs: (D, 2) points, on each level in an order in which neighbors share no point; in 32 bits, since the solver reads 20 for
-    each point. lengths: (D,) m, of the mesh between them. starts: (L + 1,) index of the first pair of each level.
+    pairs: (D, 2) points, on each level in an order in which neighbors share no point; in 32 bits, since the solver
+    reads 20 for each point. lengths: (D,) m, of the mesh between them. starts: (L + 1,) index of the first pair of
+    each level.
     """
 
     pairs: NDArray[np.int32]

@@ -72,8 +72,8 @@ def advance(
     anchors, limits = np.full((len(p), 1), -1), np.zeros((len(p), 1))
     order, faces, colliders = np.arange(len(edges)), np.zeros((0, 3), np.int64), np.zeros((substeps + 1, 0, 8))
     numbers = np.array([h, 0, -gravity, 0, compliance, 0, damping, 0, -1e30, 0, 0, 0])
-    distant = (none, np.zeros(0), np.zeros(1, np.int64))
-    constraints = (edges, lengths, none, np.zeros(0), anchors, limits, *distant, edges, lengths, order)
+    distant, levels = np.zeros((0, 2), np.int32), np.zeros(1, np.int64)
+    constraints = (edges, lengths, none, np.zeros(0), anchors, limits)
     measured = (np.zeros((substeps, 2), np.int64), np.zeros((substeps, 2)))
     step_frame(
         p,
@@ -82,6 +82,12 @@ def advance(
         pinned,
         targets,
         *constraints,
+        distant,
+        np.zeros(0),
+        levels,
+        edges,
+        lengths,
+        order,
         faces,
         colliders,
         np.zeros((substeps, 3)),
