@@ -212,3 +212,12 @@ def test_a_full_disk_takes_no_help(option: str, tmp_path: Path) -> None:
     assert os.environ.keys() & ENVIRONMENT.keys()
     done = shell(f"gltf-anim {option} > /dev/full", tmp_path)
     assert "stdout: can't be written (no space left on device)" in refusal(done, 3)
+
+
+def test_angles_of_many_thousand_turns_are_refused(call: Call, tmp_path: Path) -> None:
+    curves = tmp_path / "spin.csv"
+    curves.write_text("time,hip.rx,hip.ry,hip.rz\n0,0,0,0\n1,5.4e7,3,4\n2,0,0,0\n")
+    options = ("--order", "XYZ", "--axes", "intrinsic", "--unit", "deg")
+    done = call("from-euler", str(curves), str(tmp_path / "out.glb"), *options)
+    assert done.code == 3
+    assert "needs over 500000 keys" in done.err

@@ -25,7 +25,7 @@ TIME_ROUNDING_FRACTION = 1e-4  # fraction of a segment's length that float32 tim
 JUMP_TOLERANCE = 1e-7  # a larger difference of the value before and at a knot is a jump
 MIN_CUBIC_SEGMENT_S = 1e-5  # float32 times below a minute have a finer resolution
 MAX_SUBDIVISIONS = 64  # segments that one segment is split into at a time
-MAX_KEYS = 2_000_000
+MAX_KEYS = 500_000
 MAX_ROUNDS = 40
 
 SegmentCount: TypeAlias = Callable[[Floats, Floats], Ints]  # starts, ends (B,) → (B,); 1 where no split is needed
