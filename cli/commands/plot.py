@@ -9,9 +9,9 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.arrays import Floats
+from anim.arrays import Floats, as_floats, as_key_times
 from anim.curves.easing.table import parse
-from anim.errors import NotFoundError
+from anim.errors import DataRangeError, NotFoundError
 from anim.maths.euler import check_order
 from anim.operations.selection import Selection
 from anim.show.plots import track_plot as tracks
@@ -199,7 +199,10 @@ def _keys(text: str) -> tuple[Floats, Floats]:
         raise UsageError(f"--through can't read '{text}' (expected 0,0.9,0.2,1 or time:value,…)") from None
     if len(timed) > 1 or len(values) < 2:
         raise UsageError(f"--through has '{text}' (expected two or more values, all of them with a time or none)")
-    return times, values
+    try:
+        return as_key_times(times), as_floats(values, "K", name="values")
+    except DataRangeError as error:
+        raise UsageError(f"--through has '{text}': {error}") from None
 
 
 def _tracks(

@@ -191,7 +191,7 @@ def test_what_players_ignore_is_no_error(call: Call, asset: Find) -> None:
     [
         (("ease", "--clip", "walk"), "stutter", ["--per", "range"]),
         (("spline", "--tangents", "bspline"), "does not pass through its keys", ["--tangents", "natural"]),
-        (("bake", "--clip", "jump"), "between frames", ["--fps", "120"]),
+        (("bake", "--clip", "jump"), "between frames", ["--fps", "240"]),
     ],
 )
 def test_notes_name_the_option_that_ends_them(
