@@ -12,7 +12,7 @@ from fixtures.broken.pieces import buffered, text
 from tests.cli.conftest import Call
 from tests.cli.running import refusal
 
-LIMIT_S = 8.0  # of CPU; the quadratic versions took 20 and more
+LIMIT = 6.0  # three times the nodes take 3 times the CPU, 9 times if quadratic
 
 
 def chain(count: int) -> bytes:
@@ -31,35 +31,42 @@ def chain(count: int) -> bytes:
     )
 
 
+def seconds(call: Call, *line: str | Path) -> float:
+    """CPU seconds of a command that succeeds."""
+    began = time.process_time()
+    call(*line).product()
+    return time.process_time() - began
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("line", [["optimize", "OUT", "--effort", "fast", "--jobs", "1"], ["inspect"], ["diff", "IN"]])
 def test_a_chain_of_nodes(line: list[str], call: Call, tmp_path: Path) -> None:
-    path = tmp_path / "a.gltf"
-    path.write_bytes(chain(3000))
-    names = {"OUT": str(tmp_path / "out.glb"), "IN": str(path)}
-    began = time.process_time()
-    call(line[0], path, *(names.get(each, each) for each in line[1:])).product()
-    assert time.process_time() - began < LIMIT_S
+    taken = []
+    for count in (1000, 3000):
+        path = tmp_path / f"{count}.gltf"
+        path.write_bytes(chain(count))
+        names = {"OUT": str(tmp_path / "out.glb"), "IN": str(path)}
+        taken.append(seconds(call, line[0], path, *(names.get(each, each) for each in line[1:])))
+    assert taken[1] < LIMIT * taken[0]
 
 
-def test_columns_of_a_csv(call: Call, tmp_path: Path) -> None:
-    header = ",".join(["time", *(f"n{i}.rx" for i in range(40_000)), "n39999.rx"])
+def test_a_column_twice_among_many(call: Call, tmp_path: Path) -> None:
+    header = ",".join(["time", *(f"n{i}.rx" for i in range(40_000)), "n39999.rx"])  # minutes if it were quadratic
     (tmp_path / "a.csv").write_text(f"{header}\n")
-    began = time.process_time()
     line = ("--order", "XYZ", "--axes", "extrinsic", "--unit", "deg")
     said = refusal(call("from-euler", tmp_path / "a.csv", tmp_path / "out.glb", *line), 3)
     assert "column 'n39999.rx' twice" in said
-    assert time.process_time() - began < LIMIT_S
 
 
+@pytest.mark.slow
 def test_curves_whose_children_come_before_their_parents(call: Call, tmp_path: Path) -> None:
     (tmp_path / "arm.gltf").write_bytes(chain(2))
     call("to-euler", tmp_path / "arm.gltf", tmp_path / "a.json", "--clip", "a").product()
     about = json.loads((tmp_path / "a.json").read_text())
     node = {**about["nodes"][0], "parent": None}
-    count = 10_000
-    nodes = [{**node, "name": f"n{i}", "parent": f"n{i - 1}" if i else None} for i in range(count)]
-    (tmp_path / "a.json").write_text(json.dumps({**about, "nodes": nodes[::-1]}))
-    began = time.process_time()
-    call("from-euler", tmp_path / "a.json", tmp_path / "out.glb", "--dry-run")
-    assert time.process_time() - began < 2 * LIMIT_S
+    taken = []
+    for count in (1000, 3000):
+        nodes = [{**node, "name": f"n{i}", "parent": f"n{i - 1}" if i else None} for i in range(count)]
+        (tmp_path / "a.json").write_text(json.dumps({**about, "nodes": nodes[::-1]}))
+        taken.append(seconds(call, "from-euler", tmp_path / "a.json", tmp_path / "out.glb"))
+    assert taken[1] < LIMIT * taken[0]

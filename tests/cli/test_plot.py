@@ -147,7 +147,12 @@ def test_integrators_of_an_oscillator(call: Call) -> None:
 @pytest.mark.parametrize(
     ("omega", "step", "title"),
     [
-        ("1", "0.001", "Step 1/1000 s, ω·h = 0.001: no integrator diverges within 63 s"),
+        pytest.param(  # 63 000 steps of each
+            "1",
+            "0.001",
+            "Step 1/1000 s, ω·h = 0.001: no integrator diverges within 63 s",
+            marks=pytest.mark.slow,
+        ),
         ("12", "1/60", "Step 1/60 s, ω·h = 0.20: explicit-euler gains energy ×223000 in 5.2 s"),  # 1.04³¹⁴
         ("100", "0.0283", "Step 1/35.34 s, ω·h = 2.83: all but rk4, implicit-euler diverge"),
         ("100", "0.0285", "Step 1/35.09 s, ω·h = 2.85: all but rk4, implicit-euler diverge"),
