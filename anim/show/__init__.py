@@ -1,1 +1,1 @@
-"""Plots and filmstrips as bytes of image files."""
+"""Plots and filmstrips as bytes of image files, pages as HTML."""

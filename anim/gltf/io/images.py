@@ -81,10 +81,11 @@ def _free(target: Path, name: str, data: Bytes, copies: Mapping[Path, Bytes]) ->
 
 
 def _data_uri(data: Bytes) -> str:
-    return uri.encode_data(data.tobytes(), _media_type(data))
+    return uri.encode_data(data.tobytes(), media_type(data))
 
 
-def _media_type(data: Bytes) -> str:
+def media_type(data: Bytes) -> str:
+    """Return the media type of an image by its first bytes; application/octet-stream if unknown."""
     head = data[:12].tobytes()
     if head.startswith(b"\x89PNG"):
         return "image/png"
@@ -92,4 +93,6 @@ def _media_type(data: Bytes) -> str:
         return "image/jpeg"
     if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
         return "image/webp"
+    if head[4:12] == b"ftypavif":
+        return "image/avif"
     return "image/ktx2" if head.startswith(b"\xabKTX 20") else "application/octet-stream"

@@ -1,0 +1,1 @@
+"""Self-contained HTML pages that play files in a browser."""

@@ -1,0 +1,300 @@
+"""Files packed for the page: one GLB without any other file, the same motion in three.js, and notes about the rest."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from anim.errors import AnimError, FormatError, UnsupportedError
+from anim.files import resolver
+from anim.gltf.document import Document, copy_json
+from anim.gltf.io import json_text
+from anim.gltf.io.uri import encode_data
+from anim.gltf.reading import reader
+from anim.gltf.writing import draco_decoding, writer
+from anim.operations.resample import resample
+from anim.show.page import embedding
+from anim.show.page.embedding import embed
+from tests import draco
+from tests.files import opened, opened_fixture, opened_path
+from tests.judge import judge, needs_judge
+from tests.khronos import errors, needs_validator, validate_many
+
+Find = Callable[[str], Path]
+Json = dict[str, Any]
+MARKUP = "</script><script>alert(1)</script>"
+LOADED_BY_THREE = (
+    "AnimationPointer/24_animation_pointer.gltf",
+    "BitmojiRun.glb",
+    "BusterDrone/busterDrone.gltf",
+    "CesiumMan-gltf/CesiumMan.gltf",
+    "InterpolationTest.gltf",
+)
+
+
+def _png(color: tuple[int, int, int] = (200, 30, 30)) -> bytes:
+    file = io.BytesIO()
+    Image.new("RGB", (2, 2), color).save(file, "PNG")
+    return file.getvalue()
+
+
+def _textured(*images: Json, textures: list[Json] | None = None, **more: Any) -> Document:
+    """The biped with a material of a base color and a normal texture, of images 0 and the last."""
+    document = opened_fixture("biped")
+    found = textures or [{"source": i} for i in range(len(images))]
+    surface = {"baseColorFactor": [1, 0, 0, 1], "baseColorTexture": {"index": 0}}
+    material = {"pbrMetallicRoughness": surface, "normalTexture": {"index": len(found) - 1}, "extras": {"aTexture": 1}}
+    json = {**copy_json(document.json), "images": list(images), "textures": found, "materials": [material], **more}
+    return replace(document, json=json)
+
+
+def _edited(name: str, **parts: Any) -> Document:
+    document = opened_fixture(name)
+    return replace(document, json={**copy_json(document.json), **parts})
+
+
+def _content(glb: bytes) -> Json:
+    return opened(glb).json
+
+
+def _image(glb: bytes, index: int) -> tuple[bytes, str]:
+    """Bytes and media type of an image."""
+    document = opened(glb)
+    image = document.json["images"][index]
+    assert set(image) <= {"bufferView", "mimeType", "name"}
+    view = document.json["bufferViews"][image["bufferView"]]
+    start = view.get("byteOffset", 0)
+    return document.buffers[view["buffer"]].data[start : start + view["byteLength"]].tobytes(), image["mimeType"]
+
+
+@needs_judge
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOADED_BY_THREE)
+def test_three_plays_the_same_motion(name: str, asset: Find, tmp_path: Path) -> None:
+    path = asset(name)
+    found = embed(opened_path(path), resolver.CompanionFiles(path.parent).open)
+    (tmp_path / "page.glb").write_bytes(found.glb)
+    verdict = judge(path, tmp_path / "page.glb", rate=10)
+    assert verdict.clips
+    if "Pointer" not in name:
+        assert verdict.max_error == 0
+        assert not verdict.missing
+
+
+@needs_judge
+@pytest.mark.parametrize("extension", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
+def test_three_plays_meshopt_from_one_buffer(extension: str, tmp_path: Path) -> None:
+    document = opened_fixture("biped")
+    clips = {i: resample(clip, fps=60) for i, clip in enumerate(reader.clips(document))}
+    document, squeezed = (writer.replace_clips(document, clips, extension=each) for each in ("", extension))
+    for name, each in (("plain", document), ("squeezed", squeezed)):
+        (tmp_path / f"{name}.glb").write_bytes(embed(each).glb)
+    assert extension in _content((tmp_path / "squeezed.glb").read_bytes())["extensionsUsed"]
+    assert judge(tmp_path / "plain.glb", tmp_path / "squeezed.glb").max_error < 1e-6
+
+
+@needs_judge
+def test_pointers_at_nodes_and_meshes_play_in_three(tmp_path: Path) -> None:
+    document = opened_fixture("pointer")
+    nodes = [{key: node[key] for key in node if key != "weights"} for node in document.json["nodes"]]
+    animations = copy_json(document.json)["animations"]
+    weights = next(each for each in animations if each["name"] == "weights")
+    weights["channels"][0]["target"]["extensions"]["KHR_animation_pointer"]["pointer"] = "/meshes/0/weights"
+    document = replace(document, json={**document.json, "nodes": nodes, "animations": animations})
+    found = embed(document)
+    (tmp_path / "page.glb").write_bytes(found.glb)
+    rest = replace(document, json={**document.json, "animations": []})
+    (tmp_path / "rest.glb").write_bytes(embed(rest).glb)
+    moved = {clip.name: clip.max_error for clip in judge(tmp_path / "page.glb", tmp_path / "rest.glb").clips}
+    assert moved["weights"] == pytest.approx(np.hypot(0.25, 0.125), rel=1e-6)  # of deltas up to 0.25 m, both nodes
+    assert moved["turn"] > 0.5
+    assert moved["color"] == 0
+    plain = {each["name"]: [c["target"] for c in each["channels"]] for each in _content(found.glb)["animations"]}
+    assert plain["weights"] == [{"node": 0, "path": "weights"}, {"node": 1, "path": "weights"}]
+    assert plain["turn"] == [{"node": 0, "path": "rotation"}]
+    assert found.notes[0].startswith("4 tracks not shown: /materials/0/pbrMetallicRoughness/baseColorFactor, /nodes/1")
+    assert found.notes[0].endswith(" and 1 more")
+
+
+def test_weights_of_a_mesh_stay_a_pointer_where_a_node_has_its_own() -> None:
+    document = _edited("pointer")
+    target = next(each for each in document.json["animations"] if each["name"] == "weights")["channels"][0]["target"]
+    target["extensions"]["KHR_animation_pointer"]["pointer"] = "/meshes/0/weights"
+    found = embed(document)
+    assert found.notes[0].startswith("5 tracks not shown")
+
+
+def test_pointers_become_plain_channels() -> None:
+    found = embed(opened_fixture("pointer"))
+    targets = [c["target"] for clip in _content(found.glb)["animations"] for c in clip["channels"]]
+    assert {"node": 0, "path": "rotation"} in targets
+    assert {"node": 0, "path": "weights"} in targets
+    assert len(reader.clips(opened(found.glb))) == len(reader.clips(opened_fixture("pointer")))
+
+
+@pytest.mark.parametrize("name", ["gltf_external", "gltf_embedded", "biped", "accessors"])
+def test_one_buffer_holds_everything(name: str) -> None:
+    document = opened_fixture(name)
+    before = json_text.dump(document.json)
+    found = embed(document)
+    assert found == embed(opened_fixture(name)), "the same bytes twice"
+    assert json_text.dump(document.json) == before, "the document given is unchanged"
+    content = _content(found.glb)
+    assert [set(each) for each in content["buffers"]] == [{"byteLength"}]
+    assert not found.notes
+    for old, new in zip(reader.clips(document), reader.clips(opened(found.glb)), strict=True):
+        for a, b in zip(old.tracks, new.tracks, strict=True):
+            assert np.array_equal(a.values, b.values)
+            assert np.array_equal(a.times, b.times)
+
+
+@needs_validator
+def test_the_validator_finds_no_error() -> None:
+    files = [embed(opened_fixture(name)).glb for name in ("gltf_external", "accessors", "pointer", "morph_cube")]
+    assert not [each for report in validate_many(files) for each in errors(report)]
+
+
+def test_external_and_data_images_become_views() -> None:
+    red, blue = _png(), _png((0, 0, 250))
+    document = _textured({"uri": "skins/red%20one.png", "name": MARKUP}, {"uri": encode_data(blue, "image/png")})
+    found = embed(document, {"skins/red one.png": red}.__getitem__)
+    assert not found.notes
+    assert _image(found.glb, 0) == (red, "image/png")
+    assert _image(found.glb, 1) == (blue, "image/png")
+    assert _content(found.glb)["images"][0]["name"] == MARKUP
+    assert _content(found.glb)["materials"] == document.json["materials"]
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        ({"uri": "none.png"}, "'none.png'"),
+        ({"uri": "../secret.png"}, "leaves the file's folder"),
+        ({"uri": "/etc/passwd"}, "is absolute"),
+        ({"uri": "http://example.com/a.png"}, "has a scheme"),
+        ({"uri": "data:image/png;base64,=="}, "base64"),
+        ({"uri": "text.png"}, "is no PNG, JPEG, WebP or AVIF"),
+        ({}, "names no file"),
+    ],
+)
+def test_an_image_that_cannot_be_read_is_noted(image: Json, words: str, tmp_path: Path) -> None:
+    (tmp_path / "text.png").write_bytes(b"not a picture")
+    (tmp_path.parent / "secret.png").write_bytes(_png())
+    found = embed(_textured(image), resolver.CompanionFiles(tmp_path).open)
+    assert len(found.notes) == 1
+    assert found.notes[0].startswith("1 image not drawn: image 0 (")
+    assert words in found.notes[0]
+    content = _content(found.glb)
+    assert content["materials"] == [
+        {"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}, "extras": {"aTexture": 1}}
+    ]
+    assert Image.open(io.BytesIO(_image(found.glb, 0)[0])).getpixel((0, 0)) == 255
+    assert b"uri" not in found.glb
+
+
+def test_many_missing_images_are_one_note() -> None:
+    found = embed(_textured(*({"uri": f"{i}.png"} for i in range(7)), textures=[{"source": 0}, {"source": 6}]))
+    assert len(found.notes) == 1, "images without a texture are not missed"
+    assert found.notes[0].startswith("2 images not drawn: image 0 ('0.png' lies beside the file, which has no folder)")
+
+
+def test_ktx2_is_not_drawn_unless_there_is_another_source() -> None:
+    ktx = encode_data(b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(80), "image/png")
+    basisu = {"extensions": {"KHR_texture_basisu": {"source": 0}}}
+    required = {"extensionsUsed": ["KHR_texture_basisu"], "extensionsRequired": ["KHR_texture_basisu"]}
+    alone = embed(_textured({"uri": ktx}, textures=[basisu], **required))
+    assert alone.notes == ["1 image not drawn: image 0 (is KTX2)"]
+    assert "extensionsRequired" not in _content(alone.glb)
+    png = {"uri": encode_data(_png(), "image/png")}
+    both = embed(_textured({"uri": ktx}, png, textures=[{**basisu, "source": 1}]))
+    assert not both.notes
+    assert _content(both.glb)["textures"] == [{"source": 1}]
+
+
+def test_broken_references_to_textures_are_dropped() -> None:
+    document = _textured(textures=[{"source": 0}, {"source": True}, {"source": 99}])
+    document.json["materials"][0]["emissiveTexture"] = {"index": 17}
+    found = embed(document)
+    assert found.notes == ["3 textures without an image: drawn without"]
+    assert set(_content(found.glb)["materials"][0]) == {"pbrMetallicRoughness", "extras"}
+
+
+def test_draco_is_decoded_or_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = draco.compressed(opened_fixture("biped"))
+    found = embed(document)
+    content = _content(found.glb)
+    assert not found.notes
+    assert "KHR_draco_mesh_compression" not in str(content)
+
+    def refuse(*_: object) -> Document:
+        raise UnsupportedError("Draco needs the package DracoPy")
+
+    monkeypatch.setattr(embedding, "decode_draco", refuse)
+    found = embed(document)
+    assert found.notes == ["1 mesh not drawn: Draco needs the package DracoPy"]
+    assert not any("mesh" in node for node in _content(found.glb)["nodes"])
+    assert draco_decoding.decode_draco is not refuse
+
+
+def test_a_file_without_scenes_gets_one() -> None:
+    document = _edited("biped")
+    for key in ("scenes", "scene"):
+        document.json.pop(key, None)
+    content = _content(embed(document).glb)
+    assert content["scenes"][content["scene"]]["nodes"]
+
+
+def test_tracks_outside_the_scene_have_no_target() -> None:
+    document = _edited("morph_cube")
+    document.json["nodes"].append({"name": "elsewhere"})
+    document.json["scenes"].append({"nodes": [len(document.json["nodes"]) - 1]})
+    document.json["scene"] = len(document.json["scenes"]) - 1
+    found = embed(document)
+    tracks = sum(len(clip["channels"]) for clip in document.json["animations"])
+    assert found.notes == [
+        "1 mesh not shown: outside the default scene",
+        f"{tracks} track{'s' * (tracks != 1)} not shown: of nodes outside the default scene",
+    ]
+    assert not any("node" in c["target"] for clip in _content(found.glb)["animations"] for c in clip["channels"])
+
+
+def test_extensions_that_three_does_not_know_are_not_required() -> None:
+    document = _edited(
+        "morph_cube",
+        extensionsUsed=["ACME_light", "KHR_mesh_quantization"],
+        extensionsRequired=["ACME_light", "KHR_mesh_quantization"],
+    )
+    found = embed(document)
+    assert found.notes == ["shown without ACME_light, which the file requires"]
+    assert _content(found.glb)["extensionsRequired"] == ["KHR_mesh_quantization"]
+
+
+def test_names_with_markup_stay() -> None:
+    document = _edited("biped")
+    for each in (*document.json["nodes"], *document.json["animations"], *document.json["meshes"]):
+        each["name"] = MARKUP
+    content = _content(embed(document).glb)
+    assert {each["name"] for key in ("nodes", "animations", "meshes") for each in content[key]} == {MARKUP}
+
+
+def test_a_file_that_cannot_be_read_is_refused(asset: Find) -> None:
+    path = asset("CesiumMan-gltf/CesiumMan.gltf")
+
+    def absent(address: str) -> bytes:
+        raise FormatError(f"'{address}' is not beside the file")
+
+    document = opened(path.read_bytes(), {})
+    with pytest.raises(AnimError, match="not beside the file"):
+        embed(document, absent)
+
+
+def test_a_document_without_buffers_is_a_glb() -> None:
+    document = opened(b'{"asset": {"version": "2.0"}, "buffers": []}')
+    assert _content(embed(document).glb) == {"asset": {"version": "2.0"}, "scenes": [{}], "scene": 0}
