@@ -18,6 +18,7 @@ from anim.show.page.embedded_images import embed_images
 from anim.show.page.embedded_nodes import show_scene
 from anim.show.page.embedded_tracks import rewrite_tracks
 from anim.show.page.packing import Packing
+from anim.show.page.sticks import add_sticks
 
 MAX_INFLUENCES = 4  # per vertex in three.js
 # Extensions that three.js knows; it warns of all others that a file requires
@@ -45,8 +46,8 @@ def embed(document: Document, resolve: Resolve | None = None) -> Embedded:
     """Return a document as one GLB for three.js, which reads no other file and no network.
 
     Buffers and images are packed in. Pointers to a node's translation, rotation, scale or weights become plain
-    channels, Draco becomes plain accessors; images that cannot be read are left out of their materials. Everything
-    else, names included, is unchanged, and so is `document`. meshopt stays compressed.
+    channels, Draco becomes plain accessors; images that cannot be read are left out of their materials; a file without
+    a mesh gets sticks. Everything else, names included, is unchanged, and so is `document`. meshopt stays compressed.
     resolve: returns the bytes of a file in the input's folder by its relative path; None if the input has no folder.
     Raises FormatError or UnsupportedError if clips or meshes cannot be read.
     """
@@ -54,6 +55,9 @@ def embed(document: Document, resolve: Resolve | None = None) -> Embedded:
     reader.clips(document)
     document = _decode_draco(document, notes)
     notes += _check_meshes(document)
+    if not any("mesh" in node for node in json_array(document.json, "nodes")) and not notes:
+        document, bare = add_sticks(document), document
+        notes += [] if document is bare else ["no mesh: shown as sticks from joint to joint"]
     json, packing = copy_json(document.json), Packing(document)
     notes += show_scene(json)
     notes += rewrite_tracks(json, Accessors(document))
