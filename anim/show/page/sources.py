@@ -90,5 +90,5 @@ def _too_large(cache: VertexCache, size: int) -> UnsupportedError:
     return UnsupportedError(
         f"{cache.frame_count} frames of {cache.vertex_count} vertices are too many for a page "
         f"({size / 1e6:.0f} MB of positions)",
-        help="make fewer frames: gltf-anim convert-cache IN fewer.npz --fps 10",
+        help="make fewer frames first, by convert-cache with `fps` 10",
     )
