@@ -105,18 +105,24 @@ def _with_comment(data: bytes, opening: bytes, remark: bytes) -> bytes:
 
 
 def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray | None]:
-    import trimesh
+    from trimesh.exchange import ply, stl
+    from trimesh.geometry import triangulate_quads
 
     try:
-        # trimesh else merges the vertices of a .ply with texture coordinates
-        more: dict[str, Any] = {"fix_texture": False} if ending == ".ply" else {}
-        mesh: Any = trimesh.load(io.BytesIO(data), file_type=ending[1:], process=False, validate=False, **more)
-        positions = np.asarray(mesh.vertices)
-        faces: Ints = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64).reshape(-1, 3)
+        found: dict[str, Any]
+        if ending == ".ply":  # fix_texture would merge vertices
+            found = ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
+        else:
+            found = stl.load_stl(io.BytesIO(data))
+        positions = np.asarray(found.get("vertices", np.empty((0, 3)))).reshape(-1, 3)
+        faces = found.get("faces")
+        triangles: Ints = (
+            np.empty((0, 3), np.int64) if faces is None else np.asarray(triangulate_quads(faces), np.int64)
+        )
     except Exception as error:  # trimesh raises exceptions of any type
         raise FormatError(f"is no {ending} that can be read ({' '.join(str(error).split())[:120]})") from None
-    has_normals = ending == ".ply" and b"property float nx" in data[:1024] and "vertex_normals" in mesh._cache
-    return positions, faces, np.asarray(mesh.vertex_normals, np.float32) if has_normals else None
+    normals = found.get("vertex_normals")
+    return positions, triangles.reshape(-1, 3), None if normals is None else np.asarray(normals, np.float32)
 
 
 def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
