@@ -191,8 +191,12 @@ COMMANDS = {
         ),
     ),
     "convert": CommandInfo(
-        "Convert between .glb and .gltf; nothing else changes.",
-        ("gltf-anim convert walk.glb walk.gltf", "gltf-anim convert scene/walk.gltf - | gltf-anim inspect"),
+        "Convert between .glb and .gltf, or to skinned USD.",
+        (
+            "gltf-anim convert walk.glb walk.gltf",
+            "gltf-anim convert scene/walk.gltf - | gltf-anim inspect",
+            "gltf-anim convert walk.glb walk.usdz --fps 30",
+        ),
     ),
 }
 

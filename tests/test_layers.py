@@ -29,7 +29,12 @@ LEVELS = (
     {"api"},
 )
 NEIGHBORS = {("caches", "skinning"), ("optimization", "skinning")}
-NEIGHBORS |= {("simulation", "skinning"), ("simulation", "operations")}
+NEIGHBORS |= {
+    ("simulation", "skinning"),
+    ("simulation", "operations"),
+    ("exchange", "caches"),
+    ("exchange", "skinning"),
+}
 LEVEL = {package: level for level, packages in enumerate(LEVELS) for package in packages}
 
 MODULES = sorted(path for path in (ROOT / "anim").rglob("*.py") if path.name != "__main__.py")  # which runs the command
@@ -59,7 +64,7 @@ LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplo
 LAZY |= {"mujoco", "pxr", "dask", "distributed", "rapier3d"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
-    "caches.formats": "flipbook_reader gltf mesh_sequence",
+    "caches.formats": "flipbook_reader gltf mesh_sequence usd_materials usd_package usd_writer",
     "caches.source_document": "bake_source lit_meshes shading_normals",
     "caches.transforms": "resample statistics up_axis vertex_order",
     "caches.vat": "presets",
@@ -74,6 +79,7 @@ PUBLIC = {
     "exchange.retarget": (
         "apply bind_pose ground_contact joint_matching joint_roles rest_alignment retained_tracks retarget"
     ),
+    "exchange.usd_skel": "write",
     "gltf.io": "buffers container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader vertex_colors",

@@ -1,8 +1,9 @@
-"""`gltf-anim convert`: .glb ↔ .gltf."""
+"""`gltf-anim convert`: .glb ↔ .gltf, and skinned USD."""
 
 from __future__ import annotations
 
 import time
+from pathlib import PurePath
 from typing import Annotated
 
 import typer
@@ -10,28 +11,65 @@ import typer
 from anim.gltf.io import images
 from anim.gltf.io.source import external_files
 from cli import text
+from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
 from cli.reports import image_notes
 from cli.streams import record_files
 
+USD_SUFFIXES = (".usdz", ".usdc", ".usda")
+Output = Annotated[
+    str,
+    typer.Argument(
+        metavar="OUT",
+        help="A .glb, .gltf, .usdz, .usdc or .usda file, '-' for stdout (GLB).",
+        show_default=False,
+    ),
+]
+
 
 def command(
     input: common.Input = "-",
-    output: common.Output = "-",
+    output: Output = "-",
     *,
     embed: Annotated[bool, typer.Option("--embed", help="Embed external images, if their files exist.")] = False,
+    clip: Annotated[
+        list[str] | None,
+        typer.Option("--clip", metavar="GLOB", help="USD: the clip with this name or index ('#0')."),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            "--fps", metavar="N", help="USD: frames per second (default: those of the keys, else 60 and all keys)."
+        ),
+    ] = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> None:
-    """Convert between .glb and .gltf; nothing else changes.
+    """Convert between .glb and .gltf, where nothing else changes, or to skinned USD.
 
     A .glb contains buffer 0 in its binary chunk, and further buffers as data URIs. A .gltf has a companion .bin file.
     The rest of the JSON stays: numbers, order, extras, unknown extensions. If the output is in another folder, external
     images are copied beside it.
+
+    USD (extra usd) has the skeletons, skins and morph targets as UsdSkel, materials as UsdPreviewSurface, and one clip,
+    sampled at a frame rate and interpolated linearly; a .usdz contains its images, for phones and other programs. If
+    there are several clips, OUT must contain {clip}, or --clip selects one. The stated error is that of the farthest
+    vertex, skinned by USD, at and half-way between frames.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()
+    if fps is not None and fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+    if PurePath(output).suffix.lower() in USD_SUFFIXES:
+        from cli.workflows import skinned_usd  # its skinning takes long to import
+
+        if embed:
+            raise UsageError("--embed does not apply to USD")
+        skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, voice=voice)
+        return
+    if clip is not None or fps is not None:
+        raise UsageError(f"{'--fps' if clip is None else '--clip'} applies to USD only (.usdz, .usdc, .usda)")
     if not dry_run:
         documents.check_output(output)
     with documents.source(input, voice) as source:

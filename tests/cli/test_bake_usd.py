@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from anim.gltf.reading.accessors import Accessors
 from tests.cli.conftest import Call, Find
 from tests.files import glb_of, opened_path
 from tests.textured import looks, textured
+from tests.usd import findings, opened_stage
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
@@ -32,20 +32,6 @@ def source(tmp_path: Path) -> Path:
     path = tmp_path / "textured.glb"
     path.write_bytes(textured())
     return path
-
-
-def stage_of(path: Path) -> Any:
-    from pxr import Usd
-
-    return Usd.Stage.Open(str(path))
-
-
-def findings(path: Path) -> list[str]:
-    from pxr import UsdValidation
-
-    every = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-    found = UsdValidation.ValidationContext(every).Validate(stage_of(path))
-    return [f"{each.GetName()}: {each.GetMessage()}" for each in found]
 
 
 @pytest.mark.parametrize("ending", ["usdc", "usda", "usdz"])
@@ -92,7 +78,7 @@ def test_faces_are_bound_to_their_materials(call: Call, source: Path) -> None:
     from pxr import UsdGeom, UsdShade
 
     assert call("bake", source, source.with_name("a.usda"), "--clip", "bend", "--rigid").code == 0
-    stage = stage_of(source.with_name("a.usda"))
+    stage = opened_stage(source.with_name("a.usda"))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/root/mesh"))
     subsets = UsdGeom.Subset.GetAllGeomSubsets(mesh)
     assert [len(each.GetIndicesAttr().Get()) for each in subsets] == [8, 8]  # and a triangle without a material
@@ -106,7 +92,7 @@ def test_texture_coordinates_sample_the_same_texels(call: Call, source: Path) ->
     from pxr import UsdGeom, UsdShade
 
     assert call("bake", source, source.with_name("a.usda"), "--clip", "bend").code == 0
-    stage = stage_of(source.with_name("a.usda"))
+    stage = opened_stage(source.with_name("a.usda"))
     document = opened_path(source)
     coordinates = np.array(UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/root/mesh")).GetPrimvar("st1").Get())[18:]
     shader = UsdShade.Shader(stage.GetPrimAtPath("/root/materials/material1/diffuseColor_transform"))
@@ -150,7 +136,7 @@ def test_a_texture_that_usd_cannot_show(call: Call, source: Path) -> None:
     run = call("bake", source, source.with_name("a.usda"), "--clip", "bend")
     assert "note: a texture of material 0 is left out: is neither PNG nor JPEG" in run.err
     assert findings(source.with_name("a.usda")) == []
-    stage = stage_of(source.with_name("a.usda"))
+    stage = opened_stage(source.with_name("a.usda"))
     surface = stage.GetPrimAtPath("/root/materials/material1/surface")
     assert tuple(surface.GetAttribute("inputs:diffuseColor").Get()) == (0, 0, 0)
     assert surface.GetAttribute("inputs:emissiveColor").GetConnections()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Ints
-from anim.caches.source_document.bake_source import BakedMesh, baked_meshes
+from anim.caches.source_document.bake_source import BakedMesh, Span, baked_meshes
 from anim.caches.source_document.lit_meshes import UNLIT, find_item
 from anim.errors import FormatError
 from anim.gltf.document import Document, Json
@@ -58,9 +58,15 @@ class UsdMaterials:
         self._document, self._stage, self._scope, self._note = document, stage, scope, note
         self._accessors, self._save_image = Accessors(document), save_image
         self._files: dict[int, str] = {}
+        self._defined: dict[int, Any] = {}
 
     def define(self, number: int) -> Any:
-        """Define material `number` of the document, and return it."""
+        """Return material `number` of the document, defined on its first use."""
+        if number not in self._defined:
+            self._defined[number] = self._define(number)
+        return self._defined[number]
+
+    def _define(self, number: int) -> Any:
         from pxr import Sdf, UsdShade
 
         about = find_item(self._document.json, "materials", number)
@@ -164,19 +170,33 @@ class UsdMaterials:
 
 
 def bind_materials(cache: VertexCache, document: Document, mesh: Any, materials: UsdMaterials) -> None:
-    """Add texture coordinates to a mesh, and bind its faces to their materials, in subsets if there are several."""
+    """Add texture coordinates to the mesh of a cache, and bind its faces to their materials."""
+    meshes = baked_meshes(cache, document)
+    bind_primitives(document, mesh, materials, cache.vertex_count, cache.faces, list(_primitives(document, meshes)))
+
+
+def bind_primitives(
+    document: Document,
+    mesh: Any,
+    materials: UsdMaterials,
+    num_vertices: int,
+    faces: Ints,
+    primitives: Sequence[tuple[Json, Span]],
+) -> None:
+    """Add texture coordinates to a mesh, and bind its faces to their materials, in subsets if there are several.
+
+    faces: (T, 3). primitives: of the document, each with its vertices, in their order.
+    """
     from pxr import UsdGeom, UsdShade, Vt
 
-    meshes = baked_meshes(cache, document)
-    primitives = list(_primitives(document, meshes))
     for number in sorted({number for each, _ in primitives for number in _coordinate_sets(document.json, each)}):
-        _add_coordinates(cache, document, mesh, primitives, number)
+        _add_coordinates(document, mesh, primitives, number, num_vertices)
     used = [each.get("material", -1) for each, _ in primitives]
     about = [find_item(document.json, "materials", number) for number in used]
     materials.note_losses(each for each, _ in primitives)
     mesh.CreateDoubleSidedAttr(any(each.get("doubleSided", False) for each in about))
     starts = np.array([span[0] for _, span in primitives])
-    owner: Ints = np.searchsorted(starts, cache.faces[:, 0], side="right") - 1
+    owner: Ints = np.searchsorted(starts, faces[:, 0], side="right") - 1
     of_face = np.array(used)[owner] if len(owner) else np.empty(0, np.int64)
     numbers = sorted(set(of_face.tolist()) - {-1})
     defined = {number: materials.define(number) for number in numbers}
@@ -206,7 +226,7 @@ def flipped_transform(transform: Json) -> tuple[float, tuple[float, float], tupl
     return math.degrees(rotation), (across, down), (x + down * sine, 1 - down * cosine - y)
 
 
-def _primitives(document: Document, meshes: Sequence[BakedMesh]) -> Iterator[tuple[Json, tuple[int, int]]]:
+def _primitives(document: Document, meshes: Sequence[BakedMesh]) -> Iterator[tuple[Json, Span]]:
     """Primitives with vertices, and their vertices in the cache."""
     for each in meshes:
         for primitive, span in zip(document.json["meshes"][each.mesh]["primitives"], each.spans, strict=True):
@@ -226,12 +246,12 @@ def _coordinate_set(info: Json) -> int:
 
 
 def _add_coordinates(
-    cache: VertexCache, document: Document, mesh: Any, primitives: Sequence[tuple[Json, tuple[int, int]]], number: int
+    document: Document, mesh: Any, primitives: Sequence[tuple[Json, Span]], number: int, num_vertices: int
 ) -> None:
     from pxr import Sdf, UsdGeom, Vt
 
     accessors = Accessors(document)
-    rows: AnyArray = np.zeros((cache.vertex_count, 2), np.float32)
+    rows: AnyArray = np.zeros((num_vertices, 2), np.float32)
     for primitive, span in primitives:
         index = primitive["attributes"].get(f"TEXCOORD_{number}")
         if index is not None:

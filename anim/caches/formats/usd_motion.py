@@ -22,7 +22,9 @@ def meshes(stage: Any) -> list[Any]:
     """
     from pxr import UsdGeom
 
-    stage.SetEditTarget(stage.GetSessionLayer())
+    session = stage.GetSessionLayer()
+    session.timeCodesPerSecond = stage.GetTimeCodesPerSecond()  # else its samples are scaled, and skins are out of time
+    stage.SetEditTarget(session)
     _separate_instances(stage)
     _bake_skeletons(stage)
     for prim in stage.Traverse():

@@ -10,13 +10,13 @@ from pathlib import Path
 ARCHIVE_TIME_S = 315_532_800  # 1980-01-01, the first time of a ZIP file; else the clock is in the bytes
 
 
-def write_package(path: str, stage: str, images: Sequence[tuple[str, bytes]]) -> None:
-    """Write a .usdz at `path` from a stage's file, which comes first, and images by name."""
+def write_package(path: str, stage: str, images: Sequence[tuple[str, bytes]], *, name: str = "cache.usdc") -> None:
+    """Write a .usdz at `path` from a stage's file, which comes first as `name`, and images by name."""
     from pxr import Sdf
 
     with tempfile.TemporaryDirectory() as folder, Sdf.ZipFileWriter.CreateNew(path) as package:
         os.utime(stage, (ARCHIVE_TIME_S, ARCHIVE_TIME_S))
-        package.AddFile(stage, "cache.usdc")
+        package.AddFile(stage, name)
         for name, data in images:
             file = Path(folder) / name
             with file.open("wb") as target:

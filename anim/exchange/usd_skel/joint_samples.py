@@ -1,0 +1,124 @@
+"""Joint transforms of a UsdSkelAnimation: translation and rotation in float32, scale in float16.
+
+float16 is too coarse for a scale such as 0.01: uniform scales that do not change go into the bind transforms and the
+translations of the children. Translations correct the rounding of the joints above.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.exchange.usd_skel.skeleton_group import SkeletonGroup
+from anim.maths import matrix, quaternion
+from anim.model import Pose
+from anim.sampling.pose import PosedSkeleton
+
+CONSTANT_SCALE_TOLERANCE = 1e-6  # relative
+MIN_DETERMINANT = 1e-12  # of a parent's matrix whose rounding can be corrected
+
+
+@dataclass(frozen=True, slots=True)
+class JointSamples:
+    """Local transforms of J joints at F times.
+
+    translation: (F, J, 3) float32. rotation: (F, J, 4) float32, xyzw. scale: (F, J, 3) float16.
+    """
+
+    translation: AnyArray
+    rotation: AnyArray
+    scale: AnyArray
+
+    def local(self, frame: int) -> Floats:
+        """Return parent_from_joint (J, 3, 4) of a frame."""
+        parts = (self.translation[frame], self.rotation[frame], self.scale[frame])
+        return matrix.from_trs(*(each.astype(np.float64) for each in parts))
+
+
+def constant_scales(group: SkeletonGroup, pose: Pose) -> Floats:
+    """Return the product (J,) of the constant uniform scales of each joint and those above it, within a skeleton."""
+    own = np.ones(len(group.joints))
+    for i, node in enumerate(group.joints):
+        scale = pose.scale[:, node]
+        if scale[0, 0] and _is_constant(scale, scale[0, 0]):
+            own[i] = scale[0, 0]
+    for i, parent in enumerate(group.parents.tolist()):
+        own[i] *= own[parent] if parent >= 0 else 1.0
+    return own
+
+
+def scale_remainders(group: SkeletonGroup, pose: Pose, constant: Floats) -> Floats:
+    """Return the factors (J, 3) of constant scales that float16 loses; they belong into the bind transforms."""
+    found = np.ones((len(group.joints), 3))
+    for i, (node, parent) in enumerate(zip(group.joints, group.parents.tolist(), strict=True)):
+        scale = pose.scale[:, node]
+        wanted = scale[0] * ((1.0 if parent < 0 else constant[parent]) / constant[i])
+        stored = wanted.astype(np.float16).astype(np.float64)
+        if stored.all() and _is_constant(scale, scale[0]):
+            found[i] = wanted / stored
+    return found
+
+
+def _is_constant(rows: Floats, value: Floats | float) -> bool:
+    return bool((np.abs(rows - value) <= CONSTANT_SCALE_TOLERANCE * np.abs(value)).all())
+
+
+def joint_samples(group: SkeletonGroup, posed: PosedSkeleton, constant: Floats) -> JointSamples:
+    """Return the joints' transforms without their `constant_scales`, rounded as they are stored."""
+    frames, joints = len(posed.times), len(group.joints)
+    local = _local_matrices(group, posed)
+    found = JointSamples(
+        np.empty((frames, joints, 3), np.float32),
+        np.empty((frames, joints, 4), np.float32),
+        np.empty((frames, joints, 3), np.float16),
+    )
+    exact, stored = np.empty((joints, frames, 3, 4)), np.empty((joints, frames, 3, 4))
+    for i, parent in enumerate(group.parents.tolist()):
+        exact[i] = local[i] if parent < 0 else matrix.multiply(exact[parent], local[i])
+        above = 1.0 if parent < 0 else constant[parent]
+        rotation, scale = _rotation_and_scale(group.joints[i], posed)
+        found.rotation[:, i] = rotation
+        found.scale[:, i] = scale * (above / constant[i])
+        wanted = local[i][..., 3] * above
+        found.translation[:, i] = wanted if parent < 0 else _corrected(wanted, exact[i][..., 3], stored[parent])
+        parts = (found.translation[:, i], found.rotation[:, i], found.scale[:, i])
+        own = matrix.from_trs(*(each.astype(np.float64) for each in parts))
+        stored[i] = own if parent < 0 else matrix.multiply(stored[parent], own)
+    return found
+
+
+def _local_matrices(group: SkeletonGroup, posed: PosedSkeleton) -> Floats:
+    """parent_from_joint (J, F, 3, 4); of roots anchor_from_joint."""
+    pose, skeleton = posed.pose, posed.skeleton
+    nodes = list(group.joints)
+    found = matrix.from_trs(*(part[:, nodes].swapaxes(0, 1) for part in (pose.translation, pose.rotation, pose.scale)))
+    for node, whole in zip(skeleton.sheared.tolist(), skeleton.sheared_local, strict=True):
+        if node in group.joints:
+            found[group.joints.index(node)] = whole
+    return found
+
+
+def _rotation_and_scale(node: int, posed: PosedSkeleton) -> tuple[Floats, Floats]:
+    """Rotations (F, 4), each on the side of the one before, and scales (F, 3); of a sheared matrix the nearest."""
+    sheared = np.flatnonzero(posed.skeleton.sheared == node)
+    if len(sheared):
+        _, rotation, scale, _ = matrix.decompose(posed.skeleton.sheared_local[sheared[0]])
+        frames = len(posed.times)
+        return np.tile(rotation, (frames, 1)), np.tile(scale, (frames, 1))
+    return quaternion.align_signs(posed.pose.rotation[:, node]), posed.pose.scale[:, node]
+
+
+def _corrected(wanted: Floats, position: Floats, parent: Floats) -> Floats:
+    """Translations (F, 3) that place a joint at `position` under the parent's stored matrices (F, 3, 4).
+
+    Where these are flat, the translations `wanted`.
+    """
+    solvable = np.abs(np.linalg.det(parent[..., :3])) > MIN_DETERMINANT
+    if not solvable.any():
+        return wanted
+    found = wanted.copy()
+    offset = (position - parent[..., 3])[solvable]
+    found[solvable] = np.linalg.solve(parent[solvable][..., :3], offset[..., None])[..., 0]
+    return found

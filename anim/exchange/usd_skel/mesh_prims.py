@@ -1,0 +1,106 @@
+"""Mesh instances as Mesh prims: points, faces, normals, influences and blend shapes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats, Ints
+from anim.exchange.usd_skel.prim_names import unique, valid
+from anim.gltf.document import Json
+from anim.model import Mesh, MeshInstance
+
+
+def define_mesh(stage: Any, path: str, mesh: Mesh, faces: Ints) -> Any:
+    """Return a new Mesh prim with the points, faces (T, 3) and normals of a mesh in its own space."""
+    from pxr import UsdGeom, Vt
+
+    prim = UsdGeom.Mesh.Define(stage, path)
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.reshape(-1).astype(np.int32)))
+    prim.CreatePointsAttr(vectors(mesh.positions))
+    prim.CreateExtentAttr(vectors(np.stack((mesh.positions.min(axis=0), mesh.positions.max(axis=0)))))
+    if mesh.normals is not None:
+        prim.CreateNormalsAttr(vectors(mesh.normals))
+        prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    return prim
+
+
+def bind_influences(prim: Any, instance: MeshInstance, joints: list[int], to_skeleton: Floats) -> None:
+    """Bind the points of a mesh to joints of its skeleton. joints: index in the skeleton of each joint of the skin.
+
+    to_skeleton: (4, 4) from the mesh to the skeleton's bind pose.
+    """
+    from pxr import Gf, UsdGeom, UsdSkel, Vt
+
+    binding = UsdSkel.BindingAPI.Apply(prim.GetPrim())
+    mesh = instance.mesh
+    used = np.flatnonzero((mesh.weights > 0).any(axis=0))  # columns
+    weights, own = mesh.weights[:, used], np.array(joints)[mesh.joints[:, used]]
+    own[weights == 0] = 0
+    width = len(used)
+    indices = binding.CreateJointIndicesPrimvar(False, width)
+    indices.Set(Vt.IntArray.FromNumpy(own.astype(np.int32).reshape(-1)))
+    binding.CreateJointWeightsPrimvar(False, width).Set(Vt.FloatArray.FromNumpy(weights.astype(np.float32).reshape(-1)))
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(to_skeleton.T.tolist()))
+    assert indices.GetInterpolation() == UsdGeom.Tokens.vertex
+
+
+def add_blend_shapes(stage: Any, prim: Any, instance: MeshInstance, about: Json, taken: set[str]) -> list[str]:
+    """Add the morph targets of a mesh as blend shapes; return their names, which no other mesh of the skeleton has.
+
+    about: the mesh in the file, for the names of its targets. taken: names of the skeleton's other blend shapes.
+    """
+    from pxr import UsdSkel
+
+    path, mesh = prim.GetPath(), instance.mesh
+    own = {each.GetName() for each in prim.GetPrim().GetChildren()}
+    names, targets = list[str](), list[Any]()
+    for i, offsets in enumerate(mesh.targets):
+        name = unique(target_name(about, i), own)
+        own.add(name)
+        shape = UsdSkel.BlendShape.Define(stage, path.AppendChild(name))
+        turns = None if mesh.normal_targets is None or mesh.normals is None else mesh.normal_targets[i]
+        moved = _moved(offsets, turns)
+        shape.CreateOffsetsAttr(vectors(offsets[moved]))
+        if turns is not None:
+            shape.CreateNormalOffsetsAttr(vectors(turns[moved]))
+        if len(moved) < len(offsets):
+            _set_points(shape, moved)
+        names.append(unique(name, taken))
+        taken.add(names[-1])
+        targets.append(shape.GetPath())
+    binding = UsdSkel.BindingAPI.Apply(prim.GetPrim())
+    binding.CreateBlendShapesAttr(names)
+    binding.CreateBlendShapeTargetsRel().SetTargets(targets)
+    return names
+
+
+def target_name(about: Json, number: int) -> str:
+    """Return the valid name of a morph target, by the mesh's extras or its index."""
+    extras = about.get("extras")
+    names = extras.get("targetNames") if isinstance(extras, dict) else None
+    given = names[number] if isinstance(names, list) and number < len(names) else None
+    return valid(given) if isinstance(given, str) and given else f"target{number}"
+
+
+def vectors(rows: AnyArray) -> Any:
+    """Return rows (n, 3) as an array of USD."""
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(rows, np.float32))
+
+
+def _moved(offsets: Floats, turns: Floats | None) -> Ints:
+    """Indices of the points that a blend shape moves or whose normals it turns; the first point if none."""
+    moved = offsets.any(axis=1) if turns is None else offsets.any(axis=1) | turns.any(axis=1)
+    found: Ints = np.flatnonzero(moved)
+    return found if len(found) else np.zeros(1, np.int64)
+
+
+def _set_points(shape: Any, moved: Ints) -> None:
+    from pxr import Vt
+
+    shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(moved.astype(np.int32)))

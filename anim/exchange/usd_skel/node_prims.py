@@ -1,0 +1,96 @@
+"""Nodes as Xform prims: translate, orient and scale, with time samples where a clip moves them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.exchange.usd_skel.prim_names import PrimNames
+from anim.maths import quaternion
+from anim.model.skeleton import ancestors
+from anim.sampling.pose import PosedSkeleton
+
+ROOT = "/root"
+IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+
+
+class NodePrims:
+    """Prims of nodes in a stage, made with those above them when they are needed.
+
+    rest: at one frame, the defaults. posed: at the time codes.
+    """
+
+    def __init__(self, stage: Any, rest: PosedSkeleton, posed: PosedSkeleton, codes: Sequence[float]) -> None:
+        self._stage, self._rest, self._posed, self._codes = stage, rest, posed, codes
+        self._paths: dict[int, str] = {}
+        self.names = PrimNames()
+
+    def add(self, nodes: Iterable[int]) -> None:
+        """Make the prims of nodes and those above them, siblings in the order of the file."""
+        skeleton = self._rest.skeleton
+        wanted = {node for each in nodes if each >= 0 for node in (each, *ancestors(skeleton.parents, each))}
+        for level in skeleton.levels():
+            for node in level.tolist():
+                if node in wanted and node not in self._paths:
+                    self._define(node)
+
+    def path(self, node: int) -> str:
+        """Return the path of a node's prim; of −1 that of the stage's root."""
+        return ROOT if node < 0 else self._paths[node]
+
+    def _define(self, node: int) -> None:
+        from pxr import Gf, UsdGeom
+
+        skeleton = self._rest.skeleton
+        path = self.names.child(self.path(int(skeleton.parents[node])), skeleton.names[node] or f"node{node}")
+        self._paths[node] = path
+        prim = UsdGeom.Xform.Define(self._stage, path)
+        if skeleton.names[node] and skeleton.names[node] != path.rsplit("/", 1)[1]:
+            prim.GetPrim().SetDisplayName(plain_text(skeleton.names[node]))
+        sheared = np.flatnonzero(skeleton.sheared == node)
+        if len(sheared):
+            whole = np.vstack((skeleton.sheared_local[sheared[0]], (0, 0, 0, 1)))
+            prim.AddTransformOp().Set(Gf.Matrix4d(whole.T.tolist()))
+            return
+        rest, pose = self._rest.pose, self._posed.pose
+        rows = {name: (getattr(rest, name)[:, node], getattr(pose, name)[:, node]) for name in IDENTITY}
+        self._add_op(prim.AddTranslateOp, Gf.Vec3d, *rows["translation"], IDENTITY["translation"])
+        double = (
+            UsdGeom.XformOp.PrecisionDouble
+        )  # usd-core takes the angle from w, whose float32 has errors of 1e-4 rad
+        self._add_op(lambda: prim.AddOrientOp(double), _quaternion, *rows["rotation"], IDENTITY["rotation"])
+        self._add_op(prim.AddScaleOp, Gf.Vec3f, *rows["scale"], IDENTITY["scale"])
+
+    def _add_op(self, make: Any, kind: Any, rest: Floats, rows: Floats, identity: Sequence[float]) -> None:
+        """Add an operation with its rest value, and its values (F, C) at the time codes unless they are constant."""
+        moves = bool((rows != rest[0]).any())
+        if not moves and np.array_equal(rest[0], identity):
+            return
+        operation = make()
+        operation.Set(kind(*rest[0].tolist()))
+        if moves:
+            values = quaternion.align_signs(rows) if rows.shape[1] == 4 else rows
+            set_samples(operation, [kind(*row) for row in values.tolist()], self._codes, values)
+
+
+def set_samples(attribute: Any, values: Sequence[Any], codes: Sequence[float], rows: AnyArray) -> None:
+    """Set an attribute at time codes; values that stay the same are one default. rows: (F, …) for that comparison."""
+    if (rows == rows[0]).all():
+        attribute.Set(values[0])
+        return
+    for value, code in zip(values, codes, strict=True):
+        attribute.Set(value, code)
+
+
+def plain_text(name: str) -> str:
+    """Return a name without lone surrogates, which USD can't store."""
+    return name.encode(errors="replace").decode()
+
+
+def _quaternion(x: float, y: float, z: float, w: float) -> Any:
+    from pxr import Gf
+
+    return Gf.Quatd(w, x, y, z)

@@ -1,0 +1,46 @@
+"""Names of prims: valid in USD, and different among siblings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from anim.arrays import Ints
+
+
+class PrimNames:
+    """Names that are taken, by the path of the parent."""
+
+    def __init__(self) -> None:
+        self._taken: dict[str, set[str]] = {}
+
+    def child(self, parent: str, name: str) -> str:
+        """Return the path of a new child: child("/root", "left arm") → "/root/left_arm", then "/root/left_arm_2"."""
+        taken = self._taken.setdefault(parent, set())
+        found = unique(valid(name), taken)
+        taken.add(found)
+        return f"{parent}/{found}"
+
+
+def valid(name: str) -> str:
+    """Return a name with underscores for characters that identifiers of USD lack."""
+    from pxr import Tf
+
+    return str(Tf.MakeValidIdentifier(name.encode(errors="replace").decode()))
+
+
+def unique(name: str, taken: set[str]) -> str:
+    """Return the name, with a number if it is taken."""
+    found, number = name, 1
+    while found in taken:
+        number += 1
+        found = f"{name}_{number}"
+    return found
+
+
+def joint_paths(names: Sequence[str], parents: Ints) -> list[str]:
+    """Return the paths of joints (J,), parents before children: joint_paths(["hip", "leg"], [-1, 0]) → hip, hip/leg."""
+    known, found = PrimNames(), list[str]()
+    for name, parent in zip(names, parents.tolist(), strict=True):
+        path = known.child(found[parent] if parent >= 0 else "", name)
+        found.append(path if parent >= 0 else path[1:])
+    return found

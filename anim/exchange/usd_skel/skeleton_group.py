@@ -1,0 +1,151 @@
+"""Skins → skeletons of UsdSkel: skins whose bind poses agree share one.
+
+A UsdSkelSkeleton has one bind transform per joint; a mesh may have a matrix of its own into that bind space. Two skins
+are one skeleton if such a matrix exists, as for the clothes and the body of a character.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.errors import UnsupportedError
+from anim.model import MeshInstance, Scene, Skin
+from anim.model.skeleton import ancestors
+from anim.sampling.pose import rest_world
+
+BIND_TOLERANCE_PER_DIAGONAL = 1e-6  # of the mesh, to its corners: rounding of float32 matrices
+IDENTITY_TOLERANCE = 1e-6
+
+
+@dataclass(slots=True)
+class SkeletonGroup:
+    """A skeleton, and the mesh instances bound to it.
+
+    anchor: the node below which it is, −1 for none: the nearest one above all joints. joints: node indices, parents
+    before children; nodes between joints are joints too. inverse_bind: (4, 4) joint_from_skeleton by node, for joints
+    of skins. members: instances, each with mesh-to-skeleton (4, 4) at bind time. Without joints it is for the blend
+    shapes of one unskinned mesh on the anchor.
+    """
+
+    anchor: int
+    joints: tuple[int, ...] = ()
+    inverse_bind: dict[int, Floats] = field(default_factory=dict)
+    members: list[tuple[MeshInstance, Floats]] = field(default_factory=list)
+
+    @property
+    def parents(self) -> Ints:
+        """Index of the parent joint (J,), −1 for a root; set by `join_hierarchy`."""
+        return self._parents
+
+    _parents: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+
+
+def group_skeletons(scene: Scene, instances: Iterable[MeshInstance]) -> list[SkeletonGroup]:
+    """Return the skeletons of skinned instances, and one for each other instance with morph targets.
+
+    Raises UnsupportedError for a joint with weight whose inverse bind matrix has no inverse.
+    """
+    groups: list[SkeletonGroup] = []
+    morphed: list[SkeletonGroup] = []
+    for instance in instances:
+        if instance.skin is None:
+            if len(instance.mesh.targets):
+                morphed.append(SkeletonGroup(instance.node, members=[(instance, np.eye(4))]))
+            continue
+        binds = _inverse_binds(instance, instance.skin, scene)
+        for group in groups:
+            matrix = _matrix_into(group, binds, instance.mesh.positions)
+            if matrix is not None:
+                break
+        else:
+            group, matrix = SkeletonGroup(-1), np.eye(4)
+            groups.append(group)
+        to_skeleton = np.linalg.inv(matrix)
+        group.inverse_bind |= {
+            node: bind @ to_skeleton for node, bind in binds.items() if node not in group.inverse_bind
+        }
+        group.members.append((instance, matrix))
+    for group in groups:
+        _join_hierarchy(group, scene)
+    return groups + morphed
+
+
+def _inverse_binds(instance: MeshInstance, skin: Skin, scene: Scene) -> dict[int, Floats]:
+    """joint_from_mesh (4, 4) by node; of joints without weight, those without an inverse are replaced by the rest."""
+    used = set(np.unique(instance.mesh.joints[instance.mesh.weights > 0]).tolist())
+    found, rest = dict[int, Floats](), rest_world(scene.skeleton)
+    for i, node in enumerate(skin.joints.tolist()):
+        matrix = np.vstack((skin.inverse_bind[i], (0, 0, 0, 1)))
+        if not _is_invertible(matrix):
+            if i in used:
+                raise UnsupportedError(
+                    f"the inverse bind matrix of {scene.skeleton.label(node)} has no inverse, which USD needs",
+                    help="optimize and check keep such skins; bake to .usdz has their vertices",
+                )
+            matrix = np.vstack((rest[node], (0, 0, 0, 1)))
+            matrix = np.linalg.inv(matrix) if _is_invertible(matrix) else np.eye(4)
+        found.setdefault(node, matrix)
+    return found
+
+
+def _is_invertible(matrix: Floats) -> bool:
+    singular = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    return bool(np.isfinite(matrix).all() and singular[-1] > 1e-9 * singular[0])
+
+
+def _matrix_into(group: SkeletonGroup, binds: dict[int, Floats], positions: Floats) -> Floats | None:
+    """Mesh-to-skeleton (4, 4) for a skin in the bind pose of a group; None if there is none, or no common joint."""
+    common = [node for node in binds if node in group.inverse_bind]
+    if not common:
+        return None
+    matrix = np.linalg.inv(group.inverse_bind[common[0]]) @ binds[common[0]]
+    if np.abs(matrix - np.eye(4)).max() < IDENTITY_TOLERANCE:
+        matrix = np.eye(4)
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    corners = np.array([(x, y, z, 1) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    limit = BIND_TOLERANCE_PER_DIAGONAL * float(np.linalg.norm(high - low))
+    for node in common:
+        difference = np.linalg.inv(binds[node]) @ group.inverse_bind[node] @ matrix - np.eye(4)
+        if np.linalg.norm((corners @ difference.T)[:, :3], axis=1).max() > limit:
+            return None
+    return matrix
+
+
+def _join_hierarchy(group: SkeletonGroup, scene: Scene) -> None:
+    """Set the anchor and the joints with their parents from those with a bind."""
+    parents = scene.skeleton.parents
+    chains = {node: list(ancestors(parents, node)) for node in group.inverse_bind}
+    group.anchor = _common_ancestor(list(chains.values()), group.inverse_bind)
+    inside = set(chains)
+    for chain in chains.values():
+        inside.update(chain[: chain.index(group.anchor)] if group.anchor >= 0 else chain)
+    order = [node for level in scene.skeleton.levels() for node in level.tolist() if node in inside]
+    group.joints = tuple(_depth_first(order, parents))
+    number = {node: i for i, node in enumerate(group.joints)}
+    group._parents = np.array([number.get(int(parents[node]), -1) for node in group.joints], np.int64)
+
+
+def _common_ancestor(chains: Sequence[Sequence[int]], joints: Iterable[int]) -> int:
+    """The nearest node above all joints that is no joint, −1 for none."""
+    own = set(joints)
+    common = set(chains[0]).intersection(*chains[1:]) - own
+    return next((node for node in chains[0] if node in common), -1)
+
+
+def _depth_first(order: Sequence[int], parents: Ints) -> list[int]:
+    """The nodes, given by level, so that each is followed by its descendants."""
+    children: dict[int, list[int]] = {}
+    inside = set(order)
+    for node in order:
+        parent = int(parents[node])
+        children.setdefault(parent if parent in inside else -1, []).append(node)
+    found, stack = [], children.get(-1, [])[::-1]
+    while stack:
+        node = stack.pop()
+        found.append(node)
+        stack.extend(reversed(children.get(node, ())))
+    return found

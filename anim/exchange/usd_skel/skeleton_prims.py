@@ -1,0 +1,106 @@
+"""Skeleton and SkelAnimation prims."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import AnyArray, Floats
+from anim.exchange.usd_skel.joint_samples import JointSamples, constant_scales, joint_samples, scale_remainders
+from anim.exchange.usd_skel.mesh_prims import vectors
+from anim.exchange.usd_skel.node_prims import plain_text, set_samples
+from anim.exchange.usd_skel.prim_names import joint_paths
+from anim.exchange.usd_skel.skeleton_group import SkeletonGroup
+from anim.maths import matrix
+from anim.sampling.pose import PosedSkeleton
+
+ROOT_JOINT = "root"  # of a mesh with blend shapes only: readers expect a joint
+
+
+class SkeletonPrim:
+    """A skeleton in a stage, with its animation.
+
+    path: of the prim. rest, posed: the nodes in their rest pose and at the time codes.
+    """
+
+    def __init__(
+        self, stage: Any, path: str, group: SkeletonGroup, rest: PosedSkeleton, posed: PosedSkeleton, codes: list[float]
+    ) -> None:
+        from pxr import UsdSkel
+
+        self.path, self._group, self._codes, self._posed = path, group, codes, posed
+        prim = UsdSkel.Skeleton.Define(stage, path)
+        names = [rest.skeleton.names[node] or f"node{node}" for node in group.joints]
+        paths = joint_paths(names, group.parents) or [ROOT_JOINT]
+        constant = constant_scales(group, posed.pose)
+        factors = constant[:, None] * scale_remainders(group, posed.pose, constant)
+        at_rest = _square(joint_samples(group, rest, constant).local(0))
+        prim.CreateJointsAttr(paths)
+        if group.joints and len(set(names)) == len(names):
+            prim.CreateJointNamesAttr([plain_text(name) for name in names])
+        prim.CreateBindTransformsAttr(_matrices(_bind_transforms(group, rest, factors)))
+        prim.CreateRestTransformsAttr(_matrices(at_rest))
+        self._animation = UsdSkel.Animation.Define(stage, f"{path}/animation")
+        self._animation.CreateJointsAttr(paths)
+        self._set_joints(joint_samples(group, posed, constant))
+        UsdSkel.BindingAPI.Apply(prim.GetPrim()).CreateAnimationSourceRel().SetTargets([self._animation.GetPath()])
+
+    def set_blend_weights(self, names: Sequence[str], weights: Floats) -> None:
+        """Set the weights (F, M) of blend shapes by name."""
+        from pxr import Vt
+
+        rows = weights.astype(np.float32)
+        self._animation.CreateBlendShapesAttr(names)
+        values = [Vt.FloatArray.FromNumpy(row) for row in rows]
+        set_samples(self._animation.CreateBlendShapeWeightsAttr(), values, self._codes, rows)
+
+    def _set_joints(self, samples: JointSamples) -> None:
+        from pxr import Vt
+
+        if not self._group.joints:
+            frames = len(self._posed.times)
+            samples = JointSamples(
+                np.zeros((frames, 1, 3), np.float32),
+                np.tile(np.array((0, 0, 0, 1), np.float32), (frames, 1, 1)),
+                np.ones((frames, 1, 3), np.float16),
+            )
+        rows: tuple[tuple[Any, AnyArray, Any], ...] = (
+            (self._animation.CreateTranslationsAttr(), samples.translation, vectors),
+            (self._animation.CreateRotationsAttr(), samples.rotation, Vt.QuatfArray.FromNumpy),
+            (self._animation.CreateScalesAttr(), samples.scale, Vt.Vec3hArray.FromNumpy),
+        )
+        for attribute, values, make in rows:
+            set_samples(attribute, [make(np.ascontiguousarray(row)) for row in values], self._codes, values)
+
+
+def _bind_transforms(group: SkeletonGroup, rest: PosedSkeleton, factors: Floats) -> Floats:
+    """skeleton_from_joint (J, 4, 4) at bind time; of joints that no skin has, those of the rest pose.
+
+    factors: (J, 3) of scales that are not in the animation.
+    """
+    if not group.joints:
+        return np.eye(4)[None]
+    anchor = np.eye(4)[:3] if group.anchor < 0 else rest.world[group.anchor, 0]
+    found = _square(matrix.multiply(matrix.inverse(anchor), rest.world[list(group.joints), 0]))
+    found[:, :3, :3] /= factors[:, None]
+    for i, node in enumerate(group.joints):
+        bind = group.inverse_bind.get(node)
+        if bind is not None:
+            found[i] = np.linalg.inv(np.diag([*factors[i], 1.0]) @ bind)
+    return found
+
+
+def _square(affine: Floats) -> Floats:
+    """Matrices (J, 4, 4) of (J, 3, 4); the identity for none."""
+    found = np.tile(np.eye(4), (max(len(affine), 1), 1, 1))
+    found[: len(affine), :3] = affine
+    return found
+
+
+def _matrices(rows: Floats) -> Any:
+    """Matrices (J, 4, 4) as an array of USD, which multiplies row vectors."""
+    from pxr import Vt
+
+    return Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(rows.transpose(0, 2, 1)))

@@ -1,0 +1,135 @@
+"""Document → stage: nodes, skeletons, meshes, blend shapes and materials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.caches.formats.usd_materials import UsdMaterials, bind_primitives
+from anim.exchange.usd_skel import mesh_prims
+from anim.exchange.usd_skel.node_prims import ROOT, NodePrims
+from anim.exchange.usd_skel.skeleton_group import SkeletonGroup, group_skeletons
+from anim.exchange.usd_skel.skeleton_prims import SkeletonPrim
+from anim.gltf.document import Document, Json
+from anim.model import Clip, MeshInstance, Scene
+from anim.sampling.pose import PosedSkeleton, PoseSampler
+
+MATERIALS = f"{ROOT}/materials"
+TIME_TOLERANCE_S = 4e-7  # s, of frames; less than half the shortest jump
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimes:
+    """Times (F,) in seconds of a clip, and the time codes per second."""
+
+    seconds: Floats
+    rate: float
+
+    @property
+    def codes(self) -> list[float]:
+        """Time codes (F,), whole numbers for frames."""
+        exact = self.seconds * self.rate
+        whole = np.round(exact)
+        is_frame = np.abs(exact - whole) < TIME_TOLERANCE_S * self.rate
+        return [float(each) for each in np.where(is_frame, whole, np.round(exact, 9))]
+
+
+class StageBuilder:
+    """Writer of a document's meshes into an empty stage.
+
+    prims: the Mesh prim of every instance, by node.
+    """
+
+    def __init__(self, stage: Any, document: Document, scene: Scene, clip: Clip, times: StageTimes) -> None:
+        self._stage, self._document, self._scene, self._times = stage, document, scene, times
+        self._rest = PosedSkeleton.at_rest(scene.skeleton)
+        self._posed = PoseSampler(scene.skeleton, clip).posed(times.seconds)
+        self.prims: dict[int, Any] = {}
+
+    def build(self, save_image: Callable[[int, str, bytes], str], note: Callable[[str], None]) -> None:
+        """Write everything. save_image, note: as of UsdMaterials."""
+        from pxr import UsdGeom, UsdSkel
+
+        stage = self._stage
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        stage.SetTimeCodesPerSecond(self._times.rate)
+        stage.SetFramesPerSecond(self._times.rate)
+        stage.SetStartTimeCode(self._times.codes[0])
+        stage.SetEndTimeCode(self._times.codes[-1])
+        shown = [each for each in self._scene.instances if len(each.mesh.faces)]
+        groups = group_skeletons(self._scene, shown)
+        kind = UsdSkel.Root if groups else UsdGeom.Xform
+        stage.SetDefaultPrim(kind.Define(stage, ROOT).GetPrim())
+        self._nodes = NodePrims(stage, self._rest, self._posed, self._times.codes)
+        self._nodes.names.child(ROOT, "materials")
+        UsdGeom.Scope.Define(stage, MATERIALS)
+        self._materials = UsdMaterials(self._document, stage, MATERIALS, save_image, note)
+        bound = {each.node for group in groups for each, _ in group.members}
+        plain = [each for each in shown if each.node not in bound]
+        self._nodes.add([*(each.node for each in plain), *(group.anchor for group in groups)])
+        for each in plain:
+            self._mesh(each, each.node)
+        for group in groups:
+            self._skeleton(group)
+
+    def _skeleton(self, group: SkeletonGroup) -> None:
+        """Write a skeleton and its meshes, side by side."""
+        from pxr import UsdSkel
+
+        path = self._nodes.names.child(self._nodes.path(group.anchor), "skeleton")
+        made = SkeletonPrim(self._stage, path, group, self._rest, self._posed, self._times.codes)
+        number = {node: i for i, node in enumerate(group.joints)}
+        names, weights, taken = list[str](), list[Floats](), set[str]()
+        for instance, to_skeleton in group.members:
+            prim = self._mesh(instance, group.anchor)
+            binding = UsdSkel.BindingAPI.Apply(prim.GetPrim())
+            binding.CreateSkeletonRel().SetTargets([path])
+            if instance.skin is not None:
+                joints = [number[node] for node in instance.skin.joints.tolist()]
+                mesh_prims.bind_influences(prim, instance, joints, to_skeleton)
+            if len(instance.mesh.targets):
+                about = self._about(instance)
+                names += mesh_prims.add_blend_shapes(self._stage, prim, instance, about, taken)
+                weights.append(self._weights(instance))
+        if names:
+            made.set_blend_weights(names, np.concatenate(weights, axis=1))
+
+    def _mesh(self, instance: MeshInstance, parent: int) -> Any:
+        """Write a mesh below the prim of a node, its faces reversed if only one of both nodes mirrors them."""
+        skeleton = self._scene.skeleton
+        name = skeleton.names[instance.node] if parent != instance.node else instance.mesh.name
+        path = self._nodes.names.child(self._nodes.path(parent), name or f"mesh{instance.node}")
+        is_mirrored = self._is_mirrored(instance.node) != self._is_mirrored(parent)
+        faces = instance.mesh.faces[:, ::-1] if is_mirrored else instance.mesh.faces
+        prim = mesh_prims.define_mesh(self._stage, path, instance.mesh, faces)
+        primitives = self._primitives(instance)
+        count = len(instance.mesh.positions)
+        bind_primitives(self._document, prim, self._materials, count, instance.mesh.faces, primitives)
+        self.prims[instance.node] = prim
+        return prim
+
+    def _is_mirrored(self, node: int) -> bool:
+        return node >= 0 and float(np.linalg.det(self._rest.world[node, 0, :, :3])) < 0
+
+    def _primitives(self, instance: MeshInstance) -> list[tuple[Json, tuple[int, int]]]:
+        """The primitives with vertices, and their spans."""
+        found, at = [], 0
+        for about, part in zip(self._about(instance)["primitives"], instance.mesh.primitives, strict=True):
+            if part.vertices:
+                found.append((about, (at, at + part.vertices)))
+            at += part.vertices
+        return found
+
+    def _about(self, instance: MeshInstance) -> Json:
+        about: Json = self._document.json["meshes"][self._document.json["nodes"][instance.node]["mesh"]]
+        return about
+
+    def _weights(self, instance: MeshInstance) -> Floats:
+        """Morph weights (F, M)."""
+        animated = self._posed.weights.get(instance.node)
+        return np.tile(instance.weights, (len(self._times.seconds), 1)) if animated is None else animated

@@ -1,0 +1,98 @@
+"""glTF → skinned USD: a file for a clip, or one for each with {clip} in its name."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from anim.errors import not_written
+from anim.exchange.usd_skel.write import UsdSkelResult, write
+from anim.gltf.document import Document
+from anim.gltf.io.source import Source
+from anim.gltf.reading import reader
+from anim.measure.error.surface import diagonal
+from anim.model import Clip, Scene
+from anim.operations.selection import Selection
+from cli import text
+from cli.errors import UsageError
+from cli.io import cache_folders, documents, scenes
+from cli.reports.bake_notes import VISIBLE_ERROR_PER_DIAGONAL
+from cli.text import Reporter
+from cli.workflows.bake_clip import self_contained
+from cli.workflows.bake_jobs import bake_jobs
+
+
+def convert_to_usd(
+    input: str, output: str, *, clips: Sequence[str] | None, fps: float | None, dry_run: bool, voice: Reporter
+) -> None:
+    """Write the document at `input` as USD, with one of its clips or a file for each."""
+    if not dry_run:
+        documents.check_file(output, ("clip",))
+    with documents.source(input, voice) as source:
+        found = reader.clips(source.document)
+        chosen = Selection(clips or ()).chosen_clips(reader.names(source.document))
+        _check_one_clip(output, [(found[i].name, i) for i in chosen])
+        scene = scenes.read_scene(source.document, source.name, voice, normals=True)
+        scenes.warn_of_other_scenes(source.document, source.name, voice, None)
+        ending = Path(output).suffix.lower()
+        document = self_contained(source, {source.document.json["nodes"][i.node]["mesh"] for i in scene.instances})
+        jobs = bake_jobs(output, ending, [("", None)], [(found[i].name, i) for i in chosen])
+        for job in jobs:
+            played = Clip("", ()) if job.clip is None else found[job.clip]
+            label = "" if job.clip is None else reader.clip_label(played.name, job.clip)
+            _convert((source, document, scene), played, job.file, fps, label, voice, dry_run=dry_run)
+
+
+def _check_one_clip(output: str, clips: Sequence[tuple[str, int]]) -> None:
+    if len(clips) > 1 and "{clip}" not in output:
+        raise UsageError(
+            f"{len(clips)} clips are chosen, but USD holds one",
+            help="choose one with --clip, or put {clip} into OUT for a file per clip",
+        )
+
+
+def _convert(
+    read: tuple[Source, Document, Scene],
+    clip: Clip,
+    path: str,
+    fps: float | None,
+    label: str,
+    voice: Reporter,
+    *,
+    dry_run: bool,
+) -> None:
+    began = time.perf_counter()
+    source, document, scene = read
+    with tempfile.TemporaryDirectory() as away:
+        staged = cache_folders.outputs(path, away, dry_run=dry_run)
+        try:
+            written = write(document, scene, clip, staged, ending=Path(path).suffix.lower(), fps=fps)
+            size = staged.size(staged.names)
+            if not dry_run:
+                staged.commit()
+        except OSError as error:
+            raise not_written(path, error) from None
+        finally:
+            staged.clear()
+    for note in written.notes:
+        voice.info(f"note: {note}")
+    _note_error(written, scene, label, voice)
+    parts = [f"{path}  {text.format_change(source.size, size)}"]
+    if label:
+        frames = text.plural(written.frames, "frame")
+        parts.append(f"{label}, {frames} at {written.fps:g} fps, max {text.format_length(written.error.distance)}")
+    parts.append(text.format_duration(time.perf_counter() - began))
+    voice.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
+
+
+def _note_error(written: UsdSkelResult, scene: Scene, label: str, voice: Reporter) -> None:
+    """Note an error that can be seen."""
+    size = diagonal(scene)
+    distance, time_s = written.error
+    if distance > VISIBLE_ERROR_PER_DIAGONAL * size:
+        voice.info(
+            f"note: a vertex is {text.format_length(distance)}{text.format_fraction(distance, size)} from the source "
+            f"at {text.format_instant(time_s)}{f' of {label}' if label else ''} (reduce with a higher --fps)"
+        )

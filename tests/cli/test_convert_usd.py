@@ -1,0 +1,101 @@
+"""`convert` to skinned USD: one clip, images, the stated error, and refusals."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Call, Find, Fixture
+from tests.cli.running import help_line, refusal
+from tests.files import opened_path
+from tests.textured import looks, textured
+from tests.usd import findings, opened_stage
+
+pytest.importorskip("pxr", reason="usd-core is not installed")
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "textured.glb"
+    path.write_bytes(textured())
+    return path
+
+
+def test_a_file_per_clip(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("convert", fixture("arm"), tmp_path / "{clip}.usda", "--fps", "10")
+    assert run.code == 0
+    assert "clip 'twist', 11 frames at 10 fps, max " in run.err
+    for name in ("twist", "bend"):
+        assert findings(tmp_path / f"{name}.usda") == []
+    assert (tmp_path / "twist.usda").read_bytes() != (tmp_path / "bend.usda").read_bytes()
+
+
+def test_materials_and_images(call: Call, source: Path) -> None:
+    from pxr import UsdShade
+
+    images = [each[1] for each in looks(opened_path(source))["images"]]
+    run = call("convert", source, source.with_name("a.usdz"), "--clip", "bend")
+    assert run.code == 0
+    for words in ("cameras are left out", "vertex colors are left out", "meshes of points and lines are left out"):
+        assert run.err.count(words) == 1
+    assert findings(source.with_name("a.usdz")) == []
+    with zipfile.ZipFile(source.with_name("a.usdz")) as package:
+        assert package.namelist() == ["scene.usdc", "image0.png", "image1.png"]
+        assert [package.read(name) for name in package.namelist()[1:]] == images
+    assert call("convert", source, source.with_name("b.usdc"), "--clip", "bend").code == 0
+    assert [source.with_name(f"b.usdc-image{i}.png").read_bytes() for i in range(2)] == images
+    assert findings(source.with_name("b.usdc")) == []
+    stage = opened_stage(source.with_name("b.usdc"))
+    bound = [
+        str(UsdShade.MaterialBindingAPI(prim).GetDirectBinding().GetMaterialPath())
+        for prim in stage.Traverse()
+        if prim.GetTypeName() == "GeomSubset"
+    ]
+    assert bound == ["/root/materials/material0", "/root/materials/material1"]
+
+
+def test_images_beside_a_gltf_are_inside(call: Call, asset: Find, tmp_path: Path) -> None:
+    assert call("convert", asset("CesiumMan-gltf/CesiumMan.gltf"), tmp_path / "a.usdz").code == 0
+    with zipfile.ZipFile(tmp_path / "a.usdz") as package:
+        assert package.read("image0.jpg") == asset("CesiumMan-gltf/CesiumMan_img0.jpg").read_bytes()
+
+
+def test_back_as_a_cache(call: Call, asset: Find, tmp_path: Path) -> None:
+    """The vertices of the file, read as a cache, are those of a bake within the stated error."""
+    skinned, cache, truth = (tmp_path / name for name in ("a.usdz", "a.npz", "b.npz"))
+    assert call("convert", asset("CesiumMan.glb"), skinned, "--fps", "24").code == 0
+    assert call("convert-cache", skinned, cache).code == 0
+    assert call("bake", asset("CesiumMan.glb"), truth, "--fps", "24").code == 0
+    with np.load(cache) as found, np.load(truth) as expected:
+        assert found["times"] == pytest.approx(expected["times"], abs=1e-5)
+        assert found["positions"] == pytest.approx(expected["positions"], abs=2e-5)
+        assert np.array_equal(found["faces"], expected["faces"])
+
+
+def test_a_note_on_a_visible_error(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("convert", fixture("biped"), tmp_path / "a.usdc", "--clip", "jump", "--fps", "5")
+    assert "note: a vertex is " in run.err
+    assert "of clip 'jump' (reduce with a higher --fps)" in run.err
+
+
+def test_refusals(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    arm, out = fixture("arm"), tmp_path / "a.usdz"
+    run = call("convert", arm, out)
+    assert "2 clips are chosen, but USD holds one" in refusal(run, 2)
+    assert "put {clip} into OUT" in help_line(run)
+    assert "no clip matches 'bent'" in refusal(call("convert", arm, out, "--clip", "bent"), 5)
+    assert "--fps is 0 (expected a number above 0)" in refusal(call("convert", arm, out, "--fps", "0"), 2)
+    assert "--embed does not apply to USD" in refusal(call("convert", arm, out, "--embed"), 2)
+    assert "--clip applies to USD only" in refusal(call("convert", arm, tmp_path / "a.glb", "--clip", "bend"), 2)
+    assert "{mesh} stands for nothing" in refusal(call("convert", arm, tmp_path / "{mesh}.usdz"), 2)
+    assert not list(tmp_path.glob("*.usd*"))
+
+
+def test_a_dry_run_writes_nothing(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    run = call("convert", fixture("arm"), tmp_path / "a.usdz", "--clip", "bend", "-n")
+    assert run.code == 0
+    assert "(dry run: nothing written)" in run.err
+    assert not (tmp_path / "a.usdz").exists()
