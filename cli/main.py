@@ -143,6 +143,7 @@ COMMANDS = {
             "gltf-anim plot --ease smoothstep --ease 'cubic-bezier(.2,0,0,1)' eases.svg",
             "gltf-anim plot --through 0,0.9,0.2,1 --tangents catmull-rom --tangents natural curve.svg",
             "gltf-anim plot --integrators --omega 20 --step 1/60 stability.png",
+            "gltf-anim plot walk.glb --terminal --limit 2",
         ),
     ),
     "collapse": CommandInfo(
@@ -167,6 +168,7 @@ COMMANDS = {
             "gltf-anim render walk.glb walk.png",
             "gltf-anim render arm.glb twist.png --method lbs --method dqs --heat --clip twist",
             "gltf-anim render walk.npz walk.webp --frames 24",
+            "gltf-anim render walk.glb --terminal --at 0.2 --at 0.4",
         ),
     ),
     "simulate": CommandInfo(

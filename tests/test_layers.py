@@ -98,6 +98,7 @@ PUBLIC = {
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations simulation_plot "
         "stability_plot tangent_plot track_plot track_selection"
     ),
+    "show.terminal": "picture",
     "simulation.cloth": "colliders model options selection simulate solver",
     "simulation.particles": "attractors emission forces obstacles options rigid_colliders simulate solver",
     "simulation.rigid_bodies": "description node_globs options simulate",

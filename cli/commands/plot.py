@@ -25,12 +25,15 @@ from anim.simulation.comparison import Comparison, compare_integrators
 from anim.simulation.mass_spring import oscillator
 from cli.errors import UsageError
 from cli.io import documents
+from cli.io.terminal import choose_protocol, print_picture
 from cli.options import common
+from cli.options import terminal as pictures
 from cli.options.simulation import parse_seconds
 from cli.text import Reporter, format_bytes, plural
 
 NUM_PERIODS = 10  # of the oscillator
 MAX_STEPS = 100_000  # of it
+LINE_WIDTH_PX = 2  # of curves in a PNG
 
 
 class Format(StrEnum):
@@ -102,6 +105,8 @@ def command(
     clip: common.Clips = None,
     node: common.Nodes = None,
     path: common.Paths = None,
+    terminal: pictures.Terminal = False,
+    protocol: pictures.PictureProtocol = None,
     quiet: common.Quiet = False,
 ) -> None:
     """Plot the curves of tracks, of easings, or of tangent rules.
@@ -117,6 +122,9 @@ def command(
     draws one oscillator by every time integrator: its energy over ten periods, the amplitude gained per step against
     ω·h, and the motion in phase space. The same input and options give the same bytes. Requires matplotlib: pip install
     'gltf-anim[plot]'.
+
+    Without OUT, kitty, Ghostty, Konsole, iTerm2, WezTerm, foot and other terminals show the picture. --terminal prints
+    it in any other, in half-block characters, unless --protocol says more.
     """
     voice = Reporter(quiet)
     if ease and through is not None:
@@ -137,8 +145,12 @@ def command(
         raise UsageError("--euler and --components exclude each other")
     view = COMPONENTS if components else FROM_REST if euler is None else check_order(euler)
     source, output = _places(files or [], alone=alone)
+    shown = choose_protocol(asked=terminal, protocol=protocol, output=output)
+    if shown is not None and format is Format.SVG:
+        raise UsageError("--terminal shows no SVG", help="leave out --format, or name OUT")
     kind = _format(format, output)
-    documents.check_binary(output)
+    if shown is None:
+        documents.check_binary(output)
     if ease:
         picture = easing_plot([parse(name) for name in ease], kind=kind)
     elif integrators:
@@ -148,6 +160,9 @@ def command(
         picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
     else:
         picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
+    if shown is not None:
+        print_picture(picture, shown, line_width=LINE_WIDTH_PX)
+        return
     documents.write_bytes([np.frombuffer(picture, np.uint8)], output)
     if output != documents.PIPE:
         voice.info(f"{output}  {format_bytes(len(picture))}")

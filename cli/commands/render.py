@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -28,16 +29,20 @@ from anim.show.filmstrip import clips, filmstrip, image_file
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION
 from anim.show.filmstrip.clips import FilmstripClip, FrameSelection
 from anim.show.filmstrip.filmstrip import HEIGHT, ViewOptions
+from anim.show.terminal.picture import Protocol
 from cli import text
 from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
+from cli.io.terminal import choose_protocol, print_picture, terminal_size
 from cli.options import common, meshes
+from cli.options import terminal as pictures
 from cli.options.meshes import Method
 from cli.progress import announce_compiling
 
 EXTENSIONS = (".png", *image_file.ANIMATED_FORMATS)
 FRAMES, FPS = 8, 24.0
 MAX_FRAMES = 3000
+MIN_FRAME_COLUMNS = 24  # of half-block characters, to recognize a pose
 
 RenderSource = Annotated[
     str,
@@ -110,6 +115,8 @@ def command(
     elevation: Annotated[
         float, typer.Option("--elevation", metavar="DEG", help="Camera angle above the horizon.", min=-89, max=89)
     ] = ELEVATION,
+    terminal: pictures.Terminal = False,
+    protocol: pictures.PictureProtocol = None,
     quiet: common.Quiet = False,
 ) -> None:
     """Draw clips as a filmstrip (.png) or as an animated image (.webp, .gif, .apng).
@@ -121,15 +128,19 @@ def command(
 
     Clips are drawn one below the other, with a row per method; in an animated image, side by side. Without --clip, only
     the first clip is drawn.
+
+    Without OUT, kitty, Ghostty, Konsole, iTerm2, WezTerm, foot and other terminals show the filmstrip. --terminal
+    prints it in any other, in half-block characters (fewer frames by default), unless --protocol says more.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()
+    shown = choose_protocol(asked=terminal, protocol=protocol, output=output)
     ending = _ending(output)
     if at and (count is not None or fps is not None):
         raise UsageError("--at excludes --frames and --fps")
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
-    when = FrameSelection(tuple(at or ()), count or (None if rate else FRAMES), rate, begin, end)
+    when = FrameSelection(tuple(at or ()), count or (None if rate else _default_frames(shown)), rate, begin, end)
     with _opened(input, voice) as (seen, name, beside):
         if isinstance(seen, VertexCache):
             given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide, "textures": textures}
@@ -164,12 +175,22 @@ def command(
             drawn = image_file.animation(pictures, ending, fps=fps or when.fps or _rate(times))
         else:
             drawn = image_file.png(filmstrip.filmstrip(rows, extent, title=title, look=look))
-    documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)
+    if shown is None:
+        documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)
+    else:
+        print_picture(drawn, shown)
     frames = text.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == documents.PIPE else output
     voice.info(
         f"{called}  {text.format_bytes(len(drawn))}, {frames}, {text.format_duration(time.perf_counter() - began)}"
     )
+
+
+def _default_frames(shown: Protocol | None) -> int:
+    """Frames without an option; of half blocks, as many as have MIN_FRAME_COLUMNS each."""
+    if shown is not Protocol.BLOCKS:
+        return FRAMES
+    return min(max(terminal_size(os.environ).columns // MIN_FRAME_COLUMNS, 1), FRAMES)
 
 
 def _ending(output: str) -> str:
