@@ -26,6 +26,7 @@ from cli.options.meshes import ABOUT, Method
 from cli.progress import Progress, announce_compiling
 from cli.reports import bake_notes
 from cli.reports.bake_report import BakedFile, report_notes, report_written, summarize_files
+from cli.reports.rotation_notes import normalized_keys_note
 from cli.text import Reporter
 from cli.workflows.bake_clip import BakeOptions, default_directions, keeps_materials, keeps_nodes, source_options
 from cli.workflows.bake_jobs import PLACEHOLDERS, bake_jobs, mesh_groups
@@ -192,6 +193,7 @@ def command(
                 voice.verbose_info(f"  {summarize_files(done[-1:], method.value)}")
         at_rest = made[jobs[-1].group].rest
     report_notes(done, voice)
+    normalized_keys_note({job.clip: clips[job.clip] for job in jobs if job.clip is not None}, voice)
     bake_notes.frame_gap_note(missed, at_rest, voice, is_chosen=fps is not None)
     bake_notes.lost_data_notes(deviations, method.value, voice)
     bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)

@@ -26,6 +26,7 @@ from anim.units import format_number
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
+from cli.reports.rotation_notes import describe_non_unit_keys
 from cli.text import format_span, format_time, plural
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
@@ -142,7 +143,7 @@ def _measured(
         scene, at_nodes = Scene(skeleton, ()), True
     prover = Prover(ErrorMetric(scene))
     measured: list[Proof] = []
-    _warn_of_lengths(edited, voice)
+    _warn_of_non_unit_keys(edited, voice)
     floor = 0.0
     for i, before in edited.before.items():
         found = largest_error(prover, before, edited.after[i], floor=0.0 if voice.verbose else floor)
@@ -162,21 +163,15 @@ def _worst(measured: list[Proof]) -> Proof | None:
     return replace(worst, bound=max(bounds) if len(bounds) == len(measured) else None)
 
 
-def _warn_of_lengths(edited: EditResult, voice: text.Reporter) -> None:
-    """Warn of rotations off unit length in changed tracks: the error holds for players that normalize."""
-    off: list[tuple[str, int]] = []
-    keys = 0
+def _warn_of_non_unit_keys(edited: EditResult, voice: text.Reporter) -> None:
+    """Warn of rotations of changed tracks that are not unit quaternions: the error holds for players that normalize."""
+    counts = []
     for i, before in edited.before.items():
         new = {track.target: track for track in edited.after[i].tracks}
-        counts = non_unit_keys(before.tracks)
-        changed = [n for n, track in zip(counts, before.tracks, strict=True) if n and new.get(track.target) != track]
-        if changed:
-            off.append((before.name, i))
-            keys += sum(changed)
-    if off:
-        found = f"{text.plural(keys, 'rotation key')} of {reader.clip_labels(off)} {'is' if keys == 1 else 'are'}"
-        rest = "players that don't normalize rotations may be further off than stated"
-        voice.warn(f"{found} off unit length; {rest}")
+        keys = zip(non_unit_keys(before.tracks), before.tracks, strict=True)
+        counts.append((before.name, i, sum(count for count, track in keys if count and new.get(track.target) != track)))
+    if words := describe_non_unit_keys(counts):
+        voice.warn(f"{words}; in players that don't normalize rotations the error may be larger than stated")
 
 
 def _summary(name: str, before: int, after: int, edited: EditResult, seconds: float, *, dry_run: bool) -> str:

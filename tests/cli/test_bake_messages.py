@@ -49,6 +49,18 @@ def test_bad_sums_are_said(call: Call, tmp_path: Path) -> None:
     assert f"{start} are all 0; they follow the first joint listed, as in three.js\n" in run.err
 
 
+def test_rotation_keys_that_are_normalized_are_counted_once(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    """In the words of `resample`; the same clip in several outputs is one, and clips that aren't baked are none."""
+    path = fixture("noop")
+    words = "1 rotation key of clip 'non_unit' is not a unit quaternion; "
+    run = call("bake", path, tmp_path / "{clip}-{mesh}.npz", "--rigid")
+    assert run.code == 0
+    assert run.err.count(f"note: {words}the bake normalizes rotations, as most players do\n") == 1
+    assert f"warning: {words}" in call("resample", path, "-", "--fps", "30").err
+    assert "quaternion" not in call("bake", path, tmp_path / "straight.npz", "--rigid", "--clip", "straight").err
+    assert "quaternion" not in call("bake", path, tmp_path / "early.npz", "--rigid", "--clip", "non_unit", "-q").err
+
+
 def test_a_method_that_loses_the_model_is_told_however_quiet(call: Call, tmp_path: Path) -> None:
     _, played = torn()
     (tmp_path / "torn.glb").write_bytes(glb_of(writer.replace_clips(opened_fixture("tube"), {0: played})))

@@ -98,11 +98,11 @@ def test_a_dry_run_says_the_same_and_writes_nothing(biped: bytes, call: Call, tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_keys_off_unit_length_make_the_stated_error_one_of_players_that_normalize(fixture: Fixture, call: Call) -> None:
+def test_non_unit_keys_make_the_stated_error_one_of_players_that_normalize(fixture: Fixture, call: Call) -> None:
     """Also with -q, for it changes what the number means; not where no such track is changed."""
     path = fixture("noop")
     run = call("resample", path, "-", "--fps", "30", "-q")
-    assert "warning: 1 rotation key of clip 'non_unit' is off unit length" in run.err
+    assert "warning: 1 rotation key of clip 'non_unit' is not a unit quaternion" in run.err
     assert "normalize" in run.err
-    assert "off unit" not in call("resample", path, "-", "--fps", "30", "--clip", "straight").err
-    assert "off unit" not in call("resample", path, "-", "--fps", "30", "--path", "translation").err
+    assert "unit quaternion" not in call("resample", path, "-", "--fps", "30", "--clip", "straight").err
+    assert "unit quaternion" not in call("resample", path, "-", "--fps", "30", "--path", "translation").err
