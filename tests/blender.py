@@ -20,6 +20,7 @@ import tempfile
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,26 +30,35 @@ from anim.arrays import Floats
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = ROOT / "tests" / "blender_play.py"
 TIMEOUT = 600  # s, for one call
+FPS = 100  # frames of the scene per second; times between its frames are reached too
 
 
-def vertices(file: Path, times: Sequence[float], *, clip: str | None = None) -> dict[str, Floats]:
+def vertices(file: Path, times: Sequence[float], *, clip: str | None = None, fps: int = FPS) -> dict[str, Floats]:
     """Return the vertices (F, V, 3) of each object with a mesh, by its name: world space, m, Y up.
 
     times: s. clip: its name; None for the first. Objects are called as their nodes, where names differ and fit 63
-    bytes. Raises RuntimeError with Blender's words where the file does not load.
+    bytes. fps: frames per second of the scene; of USD that of the file. Raises RuntimeError with Blender's words where
+    the file does not load.
     """
+    return play(file, times, clip=clip, fps=fps)[0]
+
+
+def play(
+    file: Path, times: Sequence[float], *, clip: str | None = None, fps: int = FPS
+) -> tuple[dict[str, Floats], dict[str, Any]]:
+    """Return the `vertices`, and for each object "coordinates", names of its UV layers, and "images", their sizes."""
     if reason := missing():
         raise RuntimeError(reason)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.npz"
-        task = json.dumps({"clip": clip, "times": [float(time) for time in times]})
+        task = json.dumps({"clip": clip, "times": [float(time) for time in times], "fps": fps})
         command = [str(_python()), "-I", str(SCRIPT), str(file.resolve()), task, str(out)]
         own = {**os.environ, "BLENDER_USER_RESOURCES": folder}  # not the preferences of whoever runs this
         run = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, env=own)
         if run.returncode or not out.is_file():
             raise RuntimeError(f"{file.name}: {run.stderr.decode(errors='replace').strip()}")
         with np.load(out) as found:
-            return {name: np.asarray(found[name]) for name in found.files}
+            return {name: np.asarray(found[name]) for name in found.files}, json.loads(Path(f"{out}.json").read_text())
 
 
 def missing() -> str:

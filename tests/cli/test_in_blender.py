@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats import flipbook_reader, gltf
@@ -16,7 +18,8 @@ from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
 from anim.sampling import frame_times
 from anim.skinning.bake import bake
-from tests.blender import needs_blender, vertices
+from cli.units import parse_length
+from tests.blender import needs_blender, play, vertices
 from tests.cli.conftest import Call, Find
 from tests.files import opened_path
 
@@ -88,6 +91,40 @@ def test_skinned_files(call: Call, asset: Find, tmp_path: Path, name: str, comma
     document = opened_path(out)
     clip = reader.clips(document)[0]
     assert _error(out, _at_keys(document, clip), document, clip.name or None) < BOUND
+
+
+@pytest.mark.parametrize(
+    ("command", "ending"), [("bake", "glb"), ("bake", "usdz"), ("convert", "usdz"), ("convert", "usdc")]
+)
+@pytest.mark.parametrize(("name", "clip"), [("CesiumMan.glb", "#0"), ("Knight.glb", "Cheer")])
+def test_textures_are_on(
+    call: Call, asset: Find, tmp_path: Path, name: str, clip: str, command: str, ending: str
+) -> None:
+    """Blender links the image to the base color, has texture coordinates, and vertices within the stated error."""
+    source, out = asset(name), tmp_path / f"out.{ending}"
+    rigid = ("--rigid",) if command == "bake" else ()
+    run = call(command, source, out, "--clip", clip, "--fps", 24, *rigid)
+    assert run.code == 0, run.err
+    document = opened_path(source)
+    played = next(each for each in reader.clips(document) if clip in ("#0", each.name))
+    times = frame_times(played.start, played.end, fps=24)[::7]
+    truth = reorder(
+        bake(reader.scene(document), played, times=times, rigid=True), "blender" if ending == "glb" else "file"
+    )
+    seen, looks = play(out, times.tolist(), fps=24)
+    for each in looks.values():
+        assert len(each["coordinates"]) == 1
+        assert each["images"] == [[1024, 1024]]
+    stated = re.search(r"max (\S+ \S+?)(,| at frames)", run.err)
+    limit = parse_length(stated[1].replace(" ", ""), "", lambda: 0.0) * 1.05 if stated else 0.0
+    assert _farthest(seen, truth.load_all().positions) <= limit + BOUND * statistics.diagonal(truth)
+
+
+def _farthest(seen: dict[str, Floats], frames: AnyArray) -> float:
+    """Farthest vertex from any of the frames' vertices, in any order of objects."""
+    found = np.concatenate(list(seen.values()), axis=1)
+    assert found.shape == frames.shape
+    return max(float(cKDTree(frame).query(rows)[0].max()) for frame, rows in zip(frames, found, strict=True))
 
 
 def _at_keys(document: Document, clip: Clip) -> VertexCache:
