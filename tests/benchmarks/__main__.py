@@ -108,12 +108,12 @@ def _outputs(source: Path, outputs: dict[str, str]) -> None:
 
 def _phases(source: Path, output: str) -> None:
     Path(output).unlink()
-    found = _json("tests.benchmarks.phases", str(source), output, FPS)
+    found = _json("tests.benchmarks.phases", "resample", str(source), output, "--fps", FPS, "--quiet")
     total = sum(found.values())
     rows: list[list[tables.Cell]] = [
         [name, f"{each:.3f} s", f"{100 * each / total:.0f} %"] for name, each in found.items()
     ]
-    _show(["phase of resample (one run)", "time", "share"], rows)
+    _show(["phase of resample (one run)", "CPU", "fraction"], rows)
 
 
 def _starts(ours: str, peer: str | None, runs: int) -> None:

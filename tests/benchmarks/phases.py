@@ -1,29 +1,67 @@
-"""Where one run of `resample` spends its time: the functions that it calls, each without those that it calls in turn.
+"""Seconds of CPU by phase of one run of a command: each function without those that it calls in turn.
 
-python -m tests.benchmarks.phases IN OUT FPS → one JSON object, seconds by phase
+python -m tests.benchmarks.phases [FILE ...] [--effort NAME] → a table of `optimize` on each file, fractions by phase
+python -m tests.benchmarks.phases resample IN OUT --fps FPS → one JSON object, seconds by phase, of any such command
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib
 import json
+import os
+import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
-BEGAN = time.perf_counter()
+IMPORTS, REST = "import", "everything else"
+COMMANDS = ("resample", "optimize")
+DEFAULT_FILES = ("Knight.glb", "Fox.glb", "Robot.glb", "BusterDrone/busterDrone.gltf", "BitmojiRun.glb")
+OPTIONS = ("--max-error", "0.1%", "--drop", "rest", "--jobs", "1", "--quiet")
 
-# Module, function, phase. A phase inside another one is not counted twice.
-WATCHED = (
-    ("anim.gltf.io.container", "read", "read the container and check its structure"),
-    ("anim.gltf.reading.reader", "clips", "read clips (before and after)"),
-    ("anim.gltf.reading.reader", "skeleton", "read the skeleton"),
-    ("anim.gltf.reading.reader", "scene", "read meshes and skins"),
-    ("anim.operations.resample", "resample", "resample"),
-    ("anim.gltf.writing.writer", "replace_clips", "write clips into the document"),
-    ("anim.gltf.io.container", "glb", "serialize"),
-    ("cli.io.documents", "_replace", "write the file"),
+# Module, function or method, phase. A phase inside another one is not counted twice.
+READING = (
+    ("anim.gltf.io.container", "read", "read"),
+    ("anim.gltf.reading.reader", "clips", "read"),
+    ("anim.gltf.reading.reader", "skeleton", "read"),
+    ("anim.gltf.reading.reader", "scene", "read"),
 )
+WRITING = (
+    ("anim.gltf.writing.writer", "replace_clips", "write"),
+    ("anim.gltf.io.container", "glb", "write"),
+    ("cli.io.documents", "write", "write"),
+)
+WATCHED = {
+    "resample": (
+        *READING,
+        ("anim.operations.resample", "resample", "resample"),
+        ("anim.measure.error.metric", "ErrorMetric.__init__", "verification"),
+        ("anim.measure.error.metric", "ErrorMetric.error", "verification"),
+        *WRITING,
+    ),
+    "optimize": (
+        *READING,
+        ("anim.optimization.optimize", "find_constants", "analysis"),
+        ("anim.optimization.clip_optimizer", "build_context", "analysis"),
+        ("anim.optimization.clip", "analyze_source", "analysis"),
+        ("anim.optimization.clip", "TrialRunner", "analysis"),
+        ("anim.optimization.clip", "BoundUsage", "analysis"),
+        ("anim.optimization.clip_optimizer", "solve", "tracks"),
+        ("anim.optimization.clip", "search", "search"),
+        ("anim.optimization.optimize", "drop_redundant_keys", "redundant keys"),
+        ("anim.optimization.clip_optimizer", "verify", "verification"),
+        ("anim.measure.error.metric", "ErrorMetric.__init__", "verification"),
+        ("anim.measure.continuous_bound.prover", "Prover.__init__", "proof"),
+        ("anim.measure.continuous_bound.prover", "Prover.certified", "proof"),
+        ("anim.optimization.optimize", "write_solutions", "write"),
+        *WRITING,
+    ),
+}
+PHASES = (IMPORTS, "read", "analysis", "tracks", "search", "verification", "proof", "redundant keys", "write", REST)
 
 
 class Clock:
@@ -32,7 +70,7 @@ class Clock:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self._running: list[str] = []
-        self._since = time.perf_counter()
+        self._since = time.process_time()
 
     def watched(self, function: Callable[..., Any], phase: str) -> Callable[..., Any]:
         """Return the function, its time counted as this phase."""
@@ -47,36 +85,75 @@ class Clock:
         return call
 
     def _switch(self, change: Callable[[], Any]) -> None:
-        now = time.perf_counter()
+        now = time.process_time()
         if self._running:
             self.seconds[self._running[-1]] = self.seconds.get(self._running[-1], 0.0) + now - self._since
         self._since = now
         change()
 
 
-def main(source: str, target: str, fps: str) -> dict[str, float]:
-    """Return the seconds of every phase of one run, imports first, what is not watched last."""
-    import importlib
-
+def measure(arguments: Sequence[str]) -> dict[str, float]:
+    """Return the seconds of CPU of every phase of one run, imports first, what is not watched last."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before it imports numpy
     from cli import main as command_line
 
-    clock = Clock()
-    for module, name, phase in WATCHED:
-        owner = importlib.import_module(module)
-        setattr(owner, name, clock.watched(getattr(owner, name), phase))
-    from anim.measure.error.metric import ErrorMetric
-
-    for method in ("__init__", "error"):
-        setattr(ErrorMetric, method, clock.watched(getattr(ErrorMetric, method), "measure how far vertices move"))
-    importlib.import_module("cli.commands.resample")
-    imported = time.perf_counter()
-    code = command_line.run(["resample", source, target, "--fps", fps, "--quiet"])
+    clock, command = Clock(), arguments[0]
+    importlib.import_module(f"cli.commands.{command}")
+    for module, name, phase in WATCHED[command]:
+        owner: Any = importlib.import_module(module)
+        *outer, last = name.split(".")
+        for each in outer:
+            owner = getattr(owner, each)
+        setattr(owner, last, clock.watched(getattr(owner, last), phase))
+    imported = time.process_time()
+    code = command_line.run(list(arguments))
     if code:
         raise SystemExit(code)
     watched = dict(sorted(clock.seconds.items(), key=lambda each: -each[1]))
-    rest = time.perf_counter() - imported - sum(watched.values())
-    return {"import Python modules": imported - BEGAN, **watched, "everything else": rest}
+    rest = time.process_time() - imported - sum(watched.values())
+    return {IMPORTS: imported, **watched, REST: rest}
+
+
+def show(files: Sequence[Path], effort: str) -> None:
+    """Write the table of `optimize` to stdout: seconds of CPU, and the percentage of every phase."""
+    from cli import tables
+    from tests.benchmarks.processes import environment
+
+    rows: list[list[tables.Cell]] = []
+    for path in files:
+        with tempfile.TemporaryDirectory() as folder:
+            output = str(Path(folder) / "out.glb")
+            command = ["optimize", str(path), output, *OPTIONS, "--effort", effort]
+            run = subprocess.run(
+                [sys.executable, "-m", "tests.benchmarks.phases", *command],
+                env=environment(),
+                capture_output=True,
+                check=True,
+            )
+        found: dict[str, float] = json.loads(run.stdout)
+        total = sum(found.values())
+        shown = [f"{100 * found.get(phase, 0.0) / total:.0f} %" for phase in PHASES]
+        rows.append([path.stem, f"{total:.2f} s", *shown])
+    print(tables.text([f"optimize --effort {effort}", "CPU", *PHASES], rows, indent=""))  # noqa: T201
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Measure one command, or show the table of `optimize`."""
+    if arguments[:1] and arguments[0] in COMMANDS:
+        json.dump(measure(arguments), sys.stdout)
+        return
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.phases")
+    parser.add_argument("files", nargs="*", type=Path, default=_shared_files())
+    parser.add_argument("--effort", default="fast")
+    given = parser.parse_args(arguments)
+    show([path for path in given.files if path.is_file()], given.effort)
+
+
+def _shared_files() -> list[Path]:
+    from tests.files import ASSETS
+
+    return [ASSETS / name for name in DEFAULT_FILES]
 
 
 if __name__ == "__main__":
-    json.dump(main(*sys.argv[1:]), sys.stdout)
+    main(sys.argv[1:])
