@@ -58,11 +58,10 @@ def verify(
         times, prover = key_and_mid_times(before)[::2], None
     else:
         times = dense_times(before, after)
-    looks = {player: ruler.sample_errors(before, after, times, player=player) for player in players}
-    player = max(looks, key=lambda each: looks[each].error.max_error)
-    error, certified = looks[player].error, None
+    look = ruler.sample_errors(before, after, times, players=players)
+    error, player, certified = look.error, look.player, None
     if prover is not None and error.max_error <= max(bounds.max_error, FLOAT_NOISE * (ruler.diagonal or 1.0)):
-        proof = prover.certified(before, after, times, looks, enough=bounds.max_error)
+        proof = prover.certified(before, after, times, look, enough=bounds.max_error)
         error, player, certified = proof.error, proof.player, proof.bound
     wanted = detailed or bounds.max_angle is not None or bounds.max_speed_error is not None
     found = statistics(ruler, before, after, times=times, player=players[0]) if wanted else None

@@ -12,7 +12,7 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError
-from anim.model import Clip, Interpolation, Pose, Skeleton
+from anim.model import Clip, Interpolation, Pose, Skeleton, ValueKind
 from anim.model.track import NUM_COMPONENTS
 from anim.sampling.batch import Batch, ConcatenatedTracks, concatenate, lazy_batches
 from anim.sampling.track import KeyInterval, find_interval
@@ -57,23 +57,27 @@ class PoseSampler:
 
     def at(self, at: Floats) -> Pose:
         """Return the local transforms of all nodes at times `at` (F,) in seconds."""
+        return self.at_each(at, (self._sample,))
+
+    def at_each(self, at: Floats, samples: Sequence[Sampler]) -> Pose:
+        """Return the poses at times `at` (F,) by S sampling functions, which differ in rotations only: S · F frames."""
         at = arrays.as_floats(at, "F", name="times")
-        parts = {
-            "translation": _rest_values(self._skeleton.translation, len(at)),
-            "rotation": _rest_values(self._skeleton.rotation, len(at)),
-            "scale": _rest_values(self._skeleton.scale, len(at)),
-        }
+        frames = len(at) * len(samples)
+        parts = {path: _rest_values(getattr(self._skeleton, path), frames) for path in NUM_COMPONENTS}
         weights: dict[int, Floats] = {}
         places = {axis: find_interval(axis.times, at) for axis in self._time_axes}
         for stack in self._stacks:
             batch, place = stack.at(places[stack.time_axis])
-            values = self._sample(batch, at, place)
+            used = samples if batch.kind is ValueKind.ROTATION else samples[:1]
+            values = np.concatenate([sample(batch, at, place) for sample in used])
             numbers = [track.node for track in batch.tracks if track.node is not None]
-            if batch.tracks[0].path == "weights":
-                weights.update((node, values[:, i]) for i, node in enumerate(numbers))
-            else:
-                parts[batch.tracks[0].path][:, numbers] = values
-        return Pose(at, parts["translation"], parts["rotation"], parts["scale"], weights)
+            if batch.path == "weights":
+                weights.update((node, _repeated(values[:, i], frames)) for i, node in enumerate(numbers))
+                continue
+            part = parts[batch.path]
+            part.reshape(len(samples) // len(used), len(values), *part.shape[1:])[:, :, numbers] = values
+        times = at if len(samples) == 1 else _repeated(at, frames)
+        return Pose(times, parts["translation"], parts["rotation"], parts["scale"], weights)
 
     def posed(self, at: Floats) -> PosedSkeleton:
         """Return the skeleton at times `at` (F,) in seconds."""
@@ -151,6 +155,11 @@ def rest_pose(skeleton: Skeleton) -> Pose:
 def rest_world(skeleton: Skeleton) -> Floats:
     """Return world_from_node (N, 3, 4) of every node in the rest pose."""
     return PosedSkeleton.at_rest(skeleton).world[:, 0]
+
+
+def _repeated(values: Floats, frames: int) -> Floats:
+    """Values (F, ...) repeated as a whole, up to a number of frames."""
+    return values if len(values) == frames else np.concatenate([values] * (frames // len(values)))
 
 
 def _rest_values(values: Floats, frames: int) -> Floats:

@@ -156,10 +156,10 @@ def _compare_clips(
 ) -> ClipDiff:
     before, after, ruler = old[1], new[1], prover.ruler
     times = dense_times(before, after, fps=fps)
-    look = ruler.sample_errors(before, after, times, player=player)
+    look = ruler.sample_errors(before, after, times, players=(player,))
     error, bound = look.error, None
     if len(set(parse_pair(player))) == 1:
-        proof = prover.certified(before, after, times, {player: look})
+        proof = prover.certified(before, after, times, look)
         error, bound = proof.error, proof.bound
     found = statistics(ruler, before, after, times=times, player=player, fps=fps)
     one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))

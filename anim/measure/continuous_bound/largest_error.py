@@ -59,4 +59,4 @@ def is_closed(proof: Proof, diagonal: float, *, floor: float = 0.0) -> bool:
 def _proof(prover: Prover, before: Clip, after: Clip, spacing: Spacing, floor: float) -> Proof:
     times = cut_times(before, after, parts=spacing.parts, step=spacing.step)
     look = prover.ruler.sample_errors(before, after, times)
-    return prover.certified(before, after, times, {"spec": look}, floor=floor, longest=spacing.longest)
+    return prover.certified(before, after, times, look, floor=floor, longest=spacing.longest)

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
+from anim.measure.continuous_bound.influence_radius import influence_radius
 from anim.measure.continuous_bound.interval_rise import interval_rise
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
@@ -48,13 +49,10 @@ class Prover:
 
     def __init__(self, ruler: ErrorMetric) -> None:
         self.ruler = ruler
-        found = [(i, influence_radius(part)) for i, part in enumerate(ruler.parts) if len(part.groups)]
-        plain = [(i, each) for i, each in found if each is not None and each.morphing is None]
-        others = [(i, each) for i, each in found if each is not None and each.morphing is not None]
-        self._reaches = [join_reaches([each for _, each in plain])] if plain else []
-        self._reaches += [each for _, each in others]
-        self._order = [i for i, _ in (*plain, *others)]
-        self._parts = [ruler.parts[i] for i in self._order]
+        found = [(i, influence_radius(part)) for i, part in enumerate(ruler.joined) if len(part.groups)]
+        self._reaches = [each for _, each in found if each is not None]
+        self._order = [i for i, each in found if each is not None]
+        self._parts = [ruler.joined[i] for i in self._order]
         a, b = ruler.scene.skeleton, ruler.other.skeleton
         same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
         self._knows_all = same and len(self._parts) == len(found)
@@ -64,7 +62,7 @@ class Prover:
         before: Clip,
         after: Clip,
         times: Floats,
-        looks: Mapping[str, ErrorSamples],
+        look: ErrorSamples,
         *,
         enough: float | None = None,
         floor: float = 0.0,
@@ -74,22 +72,22 @@ class Prover:
 
         It is at most 1 % above the largest sample, unless intervals between times would need too many subdivisions.
         times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
-        `metric.dense_times`. looks: samples at these times, by player. enough: m, target of the bound if it is less
+        `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is less
         than 1 % above the largest sample. floor: m, bounds below it are not refined. longest: s, as for
         `interval_rise`.
         Nothing is proven for scenes with different hierarchies, for players other than those of PLAYERS, or if
         quaternions pass through zero or rotate too far between two times.
         """
-        player, worst = max(((name, look.error) for name, look in looks.items()), key=lambda each: each[1].max_error)
-        if not self._knows_all or not set(looks) <= set(PLAYERS):
+        player, worst = look.player, look.error
+        if not self._knows_all or not set(look.limits) <= set(PLAYERS):
             return Proof(None, worst, player)
         bound = max(worst.max_error, floor)
         room = max(bound * BOUND_SLACK, NOISE * self.ruler.diagonal)
         aim = ProofTarget(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
         seen = RefinedMaximum()
-        for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(looks))):
-            stretch = slice(start, start + self._length(len(looks)) + 1)
-            limits = _limits(looks, self._order, stretch)
+        for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(look.limits))):
+            stretch = slice(start, start + self._length(len(look.limits)) + 1)
+            limits = _limits(look.limits, self._order, stretch)
             closed, other = self._proven((before, after), times[stretch], limits, aim, longest)
             bound = max(bound, closed, other.bound)
             seen = max(seen, other, key=lambda each: each.largest)
@@ -124,10 +122,12 @@ class Prover:
         return closed, refine(self.ruler, clips, asked, self._parts, target=aim.found + aim.slack)
 
 
-def _limits(looks: Mapping[str, ErrorSamples], order: Sequence[int], stretch: slice) -> dict[str, Floats]:
+def _limits(
+    limits: Mapping[str, Sequence[NDArray[np.float32]]], order: Sequence[int], stretch: slice
+) -> dict[str, Floats]:
     """Bounds of the displacement of groups at given times, by player in PLAYER_ORDER."""
     return {
-        player: np.concatenate([looks[player].limits[i][:, stretch] for i in order]).astype(np.float64)
+        player: np.concatenate([limits[player][i][:, stretch] for i in order]).astype(np.float64)
         for player in PLAYER_ORDER
-        if player in looks
+        if player in limits
     }

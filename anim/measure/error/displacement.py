@@ -41,14 +41,14 @@ class BoundGroups:
     """Vertices in groups, as products in which displacements by joint matrices are linear.
 
     reach: indices of the joints that influence each group. products: (V_g, J_g · 4) of each group: skin weight
-    times x, y, z, 1, per joint. corners: (J, P, 3), corner points around the vertices of each joint. share: the largest
-    sum of skin weights of a vertex.
+    times x, y, z, 1, per joint. corners: (J, P, 3), corner points around the vertices of each joint. fraction: the
+    largest sum of skin weights of a vertex, of all or (J, 1) of each joint.
     """
 
     reach: Sequence[Ints]
     products: Sequence[Floats]
     corners: Floats
-    fraction: float = 1.0
+    fraction: Floats | float = 1.0
 
 
 class SkinnedDisplacement:
@@ -65,7 +65,7 @@ class SkinnedDisplacement:
     @cached_property
     def _bounds(self) -> Floats:
         """(J, F), upper bounds of the lengths of vectors with influence of a joint."""
-        return self._groups.fraction * largest_over(self._groups.corners, self._moved)
+        return np.asarray(self._groups.fraction * largest_over(self._groups.corners, self._moved))
 
     def rate(self, step: Floats) -> DisplacementField:
         """Return the rates of change of the vectors between frames. step: (F − 1,) s from each to the next."""
@@ -216,12 +216,16 @@ def max_displacement(field: DisplacementField, *, floor: float, slack: float, mo
 
 def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:
     """Bounds of groups (G, F) from bounds of joints (J, F)."""
-    return np.array([bounds[joints].max(axis=0) for joints in reach])
+    starts = np.cumsum([0, *map(len, reach[:-1])])
+    return np.asarray(np.maximum.reduceat(bounds[np.concatenate(reach)], starts, axis=0))
 
 
 def largest_over(points: Floats, moved: Floats) -> Floats:
     """Return the largest displacement (J, F) of points (J, P, 3) by matrix differences (J, F, 3, 4)."""
-    displaced = moved[..., :3] @ np.swapaxes(points, -1, -2)[:, None]  # (J, F, 3, P)
-    displaced += moved[..., 3, None]
-    displaced *= displaced
-    return np.asarray(np.sqrt(displaced.sum(axis=-2).max(axis=-1)))
+    whole = np.concatenate((points, np.ones((*points.shape[:-1], 1))), axis=-1)
+    flat = moved.reshape(len(moved), -1, 4) @ np.swapaxes(whole, -1, -2)  # (J, 3 F, P), one product per joint
+    flat *= flat
+    displaced = flat.reshape(*moved.shape[:3], -1)
+    squares = displaced[:, :, 0] + displaced[:, :, 1]
+    squares += displaced[:, :, 2]
+    return np.asarray(np.sqrt(squares.max(axis=-1)))

@@ -7,7 +7,7 @@ the length of a clip.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, unique_sorted
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.displacement import max_displacement
+from anim.measure.error.joined_groups import join_groups
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
@@ -56,14 +57,15 @@ class MotionError:
 
 @dataclass(frozen=True, slots=True)
 class ErrorSamples:
-    """Errors at some times (F,).
+    """Errors at some times (F,), in one or several players.
 
-    limits: of each part of the metric (G, F) in m, upper bounds of the displacement of a group's vertices; 0 without
-    joints. In float32, since there are many.
+    error, player: the largest, and the player with it. limits: by player, of each part of the metric (G, F) in m,
+    upper bounds of the displacement of a group's vertices; 0 without joints. In float32, since there are many.
     """
 
     error: MotionError
-    limits: Sequence[NDArray[np.float32]]
+    player: str
+    limits: Mapping[str, Sequence[NDArray[np.float32]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,7 @@ class ErrorMetric:
         if shell is not None:
             nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, found) & (self.pairs.nodes >= 0))
             self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
+        self.joined = join_groups(self.parts)
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
         """Return the error of `after` at the times of `dense_times`.
@@ -106,35 +109,64 @@ class ErrorMetric:
 
         player: a name in PLAYERS, for both clips; or two, "spec,nlerp", for `before` and `after`.
         """
-        return self._sample_block(before, after, times, player, None)
+        return self._sampled(before, after, times, (player,), None)[0]
 
-    def sample_errors(self, before: Clip, after: Clip, times: Floats, *, player: str = "spec") -> ErrorSamples:
-        """Return the same as `error_at`, with limits for all times and groups of vertices."""
-        limits = [np.zeros((len(part.groups), len(times)), np.float32) for part in self.parts]
-        return ErrorSamples(self._sample_block(before, after, times, player, limits), limits)
+    def sample_errors(
+        self, before: Clip, after: Clip, times: Floats, *, players: Sequence[str] = ("spec",)
+    ) -> ErrorSamples:
+        """Return the largest error in any of the players at `times` (F,), with limits for all times and groups."""
+        limits = {
+            player: [np.zeros((len(part.groups), len(times)), np.float32) for part in self.joined] for player in players
+        }
+        return ErrorSamples(*self._sampled(before, after, times, players, limits), limits)
 
-    def _sample_block(
-        self, before: Clip, after: Clip, times: Floats, player: str, limits: Sequence[NDArray[np.float32]] | None
-    ) -> MotionError:
-        """The same as `error_at`. limits: arrays to write the limits of groups into, or None."""
-        size, frame, place, joint, vertex = 0.0, 0, "", -1, -1
+    def _sampled(
+        self,
+        before: Clip,
+        after: Clip,
+        times: Floats,
+        players: Sequence[str],
+        limits: Mapping[str, Sequence[NDArray[np.float32]]] | None,
+    ) -> tuple[MotionError, str]:
+        """The largest error, and its player. limits: arrays to write the limits of groups into, or None."""
+        size, frame, place, joint, vertex, worst = 0.0, 0, "", -1, -1, players[0]
         first = 0
-        for block in self.blocks(before, after, times, player=player):
-            shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.parts))
+        for block in self._blocks_of_players(before, after, times, players):
+            count = len(block.times) // len(players)
+            shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.joined))
             fields = [(i, field) for i, field in shown if field is not None]
             for i, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
-                part = self.parts[i]
+                part = self.joined[i]
                 found = max_displacement(field, floor=max(size, NOISE * self.diagonal), slack=SLACK, most=MAX_SEARCHED)
                 if limits is not None:
-                    limits[i][:, first : first + len(block.times)] = _round_up(found.limits)
+                    rounded = _round_up(found.limits).reshape(-1, len(players), count)
+                    for p, player in enumerate(players):
+                        limits[player][i][:, first : first + count] = rounded[:, p]
                 if found.length > size:
-                    size, frame, vertex = found.length, first + found.frame, part.vertex(found)
+                    size, vertex, worst = found.length, part.vertex(found), players[found.frame // count]
+                    frame = first + found.frame % count
                     joint = part.node(field.joint(found.group, found.frame, found.vertex))
-                    place = part.name or self.called(joint)
-            first += len(block.times)
+                    place = part.name_of(found.group) or self.called(joint)
+            first += count
         time = float(times[frame]) if len(times) else 0.0
-        share, pointer = pointer_error(before, after, times)
-        return MotionError(size, time, place, self.called(joint), len(times), share, pointer, vertex)
+        fraction, pointer = pointer_error(before, after, times)
+        return MotionError(size, time, place, self.called(joint), len(times), fraction, pointer, vertex), worst
+
+    def _blocks_of_players(self, before: Clip, after: Clip, times: Floats, players: Sequence[str]) -> Iterator[Block]:
+        """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""
+        pairs = [parse_pair(player) for player in players]
+        samplers = [
+            (PoseSampler(scene.skeleton, clip), [sampler(pair[i]) for pair in pairs])
+            for i, (scene, clip) in enumerate(((self.scene, before), (self.other, after)))
+        ]
+        length = max(self.length // len(players), 1)
+        for start in range(0, max(len(times), 1), length):
+            chosen = times[start : start + length]
+            old, new = (
+                PosedSkeleton(scene.skeleton, poses.at_each(chosen, samples))
+                for scene, (poses, samples) in zip((self.scene, self.other), samplers, strict=True)
+            )
+            yield Block(old.times, old, new)
 
     def blocks(
         self, before: Clip, after: Clip, times: Floats, *, player: str = "spec", overlap: int = 0

@@ -62,6 +62,10 @@ class PointGroups(Protocol):
         """Name of the mesh or node, for reports; empty if each group has its own."""
         ...
 
+    def name_of(self, group: int) -> str:
+        """Return the name of a group's mesh or node; empty for shells."""
+        ...
+
     def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
         """Return the displacement of every point at every time, None without points."""
         ...
@@ -87,8 +91,8 @@ class SkinnedGroups:
     """A surface with vertices grouped by their main joint, and boxes around joints' vertices.
 
     new: joints of the surface in the second version, if they differ. used: indices of the joints with influence.
-    reach: of each group the joints with influence, as indices into `used`. share: the largest sum of skin weights of a
-    vertex.
+    reach: of each group the joints with influence, as indices into `used`. fraction: the largest sum of skin weights of
+    a vertex. bound_groups: the vertices at the rest weights of morph targets, in mesh space.
     """
 
     def __init__(self, surface: Surface, new: Binding | None = None) -> None:
@@ -106,8 +110,8 @@ class SkinnedGroups:
         self.reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
         rest = surface.points + np.tensordot(surface.rest_weights, surface.targets, axes=1)
         products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
-        self._still = BoundGroups(self.reach, products, self._boxes(rest), self.fraction)
-        corners = self._boxes(surface.points) if len(surface.targets) else self._still.corners
+        self.bound_groups = BoundGroups(self.reach, products, self._boxes(rest), self.fraction)
+        corners = self._boxes(surface.points) if len(surface.targets) else self.bound_groups.corners
         self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.fraction)
 
     def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
@@ -123,11 +127,11 @@ class SkinnedGroups:
         before_weights, after_weights = self.old.weights(old.pose), self.new.weights(new.pose)
         rest = self.surface.rest_weights
         if (before_weights == rest).all() and (after_weights == rest).all():
-            return SkinnedDisplacement(self._still, moved)
+            return SkinnedDisplacement(self.bound_groups, moved)
         change = Change(moved, matrix.multiply(after, bind), before_weights, after_weights)
         return MorphedDisplacement(
             self._boxed.sizes(change),
-            (self._still.reach, self.groups),
+            (self.bound_groups.reach, self.groups),
             displaced=lambda frames: self._displaced(frames, old, new),
             rates=lambda step: self._boxed.rates(change, step),
         )
@@ -142,6 +146,11 @@ class SkinnedGroups:
     def name(self) -> str:
         """Name of the mesh or node, for reports."""
         return self.surface.name
+
+    def name_of(self, group: int) -> str:
+        """Return the name of the mesh or node."""
+        del group
+        return self.name
 
     def leader(self, group: int) -> int:
         """Return the index of the node with the largest weight on each vertex of a group, in the first scene."""

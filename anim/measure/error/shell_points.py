@@ -16,7 +16,7 @@ class ShellPoints:
     """Six points at `radius` (m, in the rest pose) along the axes of some nodes, each node a group.
 
     nodes, partners: (S,) their indices in the scenes before and after. points: (S, 6, 3) m, in the nodes' spaces.
-    reach: of each group its node, as an index into `nodes`.
+    reach: of each group its node, as an index into `nodes`. bound_groups: the points, in the nodes' spaces.
     """
 
     def __init__(self, skeleton: Skeleton, nodes: Ints, partners: Ints, radius: float) -> None:
@@ -26,18 +26,23 @@ class ShellPoints:
         self.points = points
         self.groups: list[Ints] = [np.arange(6, dtype=np.int64)] * len(nodes)
         self.reach: list[Ints] = [np.array([i]) for i in range(len(nodes))]
-        self._groups = BoundGroups(self.reach, list(whole), points)
+        self.bound_groups = BoundGroups(self.reach, list(whole), points)
 
     @property
     def name(self) -> str:
         """Empty: each group has the name of its node."""
         return ""
 
+    def name_of(self, group: int) -> str:
+        """Return an empty name: each group has that of its node."""
+        del group
+        return self.name
+
     def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
         """Return the displacement of the points at every time, None without points."""
         if not len(self.nodes) or not len(old.pose.times):
             return None
-        return SkinnedDisplacement(self._groups, new.world[self.partners] - old.world[self.nodes])
+        return SkinnedDisplacement(self.bound_groups, new.world[self.partners] - old.world[self.nodes])
 
     def weights(self, old: PosedSkeleton, new: PosedSkeleton) -> list[tuple[int, Floats, Floats]]:
         """Return an empty list: shells are not morphed."""

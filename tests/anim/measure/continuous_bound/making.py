@@ -51,8 +51,8 @@ def proven(scene: Scene, before: Clip, after: Clip, *, players: Sequence[str] = 
     """What is certified of a pair of clips, looked at where `optimize` looks."""
     ruler = ErrorMetric(scene)
     times = dense_times(before, after)
-    looks = {player: ruler.sample_errors(before, after, times, player=player) for player in players}
-    return Prover(ruler).certified(before, after, times, looks, **more)
+    look = ruler.sample_errors(before, after, times, players=players)
+    return Prover(ruler).certified(before, after, times, look, **more)
 
 
 def apart(scene: Scene, before: Clip, after: Clip, times: Floats, player: str) -> float:

@@ -80,7 +80,7 @@ def test_every_stretch_keeps_its_own_bound(player: str) -> None:
     times = np.unique(np.concatenate([np.linspace(0, 1, 60), before.key_times, after.key_times]))
     ruler = ErrorMetric(of)
     found = _rises(of, before, after, times, player)
-    limits = np.concatenate(ruler.sample_errors(before, after, times, player=player).limits)
+    limits = np.concatenate(ruler.sample_errors(before, after, times, players=(player,)).limits[player])
     tops = (np.maximum(limits[:, :-1], limits[:, 1:] + found.jump) + found.rise).max(axis=0)
     for share in (0.2, 0.5, 0.8, 1 - 1e-12):
         for i in range(0, len(tops), 7):

@@ -57,8 +57,8 @@ def test_real_files(asset: Asset, name: str, number: int, step: int) -> None:
     after = clip(*(_coarser(each, step) for each in before.tracks))
     ruler = ErrorMetric(of, shell=0.01)
     times = dense_times(before, after)
-    looks = {player: ruler.sample_errors(before, after, times, player=player) for player in ALL}
-    found = Prover(ruler).certified(before, after, times, looks)
+    look = ruler.sample_errors(before, after, times, players=ALL)
+    found = Prover(ruler).certified(before, after, times, look)
     assert found.bound is not None
     assert found.error.max_error <= found.bound <= (1 + BOUND_SLACK) * found.error.max_error + 1e-6 * ruler.diagonal
     dense = between(times, 50)
@@ -97,9 +97,9 @@ def test_the_ends_alone_show_nothing_and_the_second_look_shows_all() -> None:
     end = np.array([np.cos(np.radians(20)) - 1, np.sin(np.radians(20)), 0]) * RADIUS
     arc, chord = clip(track("rotation", [0, 1], turn)), clip(track("translation", [0, 1], np.array([np.zeros(3), end])))
     ruler, times = ErrorMetric(POINT), np.array([0.0, 1.0])
-    looks = {"spec": ruler.sample_errors(chord, arc, times)}
-    assert looks["spec"].error.max_error < 1e-12
-    found = Prover(ruler).certified(chord, arc, times, looks)
+    look = ruler.sample_errors(chord, arc, times)
+    assert look.error.max_error < 1e-12
+    found = Prover(ruler).certified(chord, arc, times, look)
     sagitta = RADIUS * (1 - np.cos(np.radians(10)))
     assert found.bound is not None
     assert sagitta * (1 - 1e-12) <= found.bound < 1.02 * sagitta
@@ -114,8 +114,8 @@ def test_the_moment_before_a_jump() -> None:
     before, after = (clip(track("rotation", [0, 1, 2], each)) for each in (keys, long))
     ruler = ErrorMetric(POINT)
     times = dense_times(before, after)
-    look = ruler.sample_errors(before, after, times, player="three")
-    found = Prover(ruler).certified(before, after, times, {"three": look})
+    look = ruler.sample_errors(before, after, times, players=("three",))
+    found = Prover(ruler).certified(before, after, times, look)
     truth = apart(POINT, before, after, np.array([np.nextafter(1, 0)]), "three")
     assert truth > 1.01 * look.error.max_error
     assert found.bound is not None
@@ -157,10 +157,7 @@ def test_what_can_not_be_proven_is_not() -> None:
     assert proven(POINT, turning, through).bound is None
     one, other = (Scene(skeleton([-1, 0, parent]), ()) for parent in (0, 1))
     ruler, times = ErrorMetric(one, other), np.array([0.0, 1.0])
-    assert (
-        Prover(ruler).certified(turning, turning, times, {"spec": ruler.sample_errors(turning, turning, times)}).bound
-        is None
-    )
+    assert Prover(ruler).certified(turning, turning, times, ruler.sample_errors(turning, turning, times)).bound is None
 
 
 def test_one_time_is_every_time() -> None:
