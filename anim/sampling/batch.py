@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.model import Interpolation, TimeAxis, Track, ValueKind
 from anim.sampling.track import KeyInterval, find_interval, interpolate
 
@@ -61,6 +61,10 @@ class Batch(TrackGroup):
         """Key times (K,) in seconds."""
         return self.time_axis.times
 
+    def is_inside(self, at: Floats) -> Bools:
+        """Return the mask (F,) of the times from the first key on and before the last."""
+        return np.asarray((at >= self.times[0]) & (at < self.times[-1]))
+
     def sample(self, at: Floats, place: KeyInterval | None = None) -> Floats:
         """Return the values (F, G, C) at times `at` (F,); a known `place` saves its search."""
         place = place or find_interval(self.times, at)
@@ -98,6 +102,60 @@ class LazyBatch:
         joined = _stack_values(self.tracks, lambda each: np.stack([values[low:high] for values in each], axis=1))
         moved = replace(place, left=place.left - low, right=place.right - low)
         return Batch(self.tracks, self.numbers, TimeAxis(self.time_axis.times[low:high]), *joined), moved
+
+
+@dataclass(frozen=True, slots=True)
+class MixedBatch(TrackGroup):
+    """G tracks of one rule with different times, keys concatenated: S keys in all.
+
+    axes: distinct. axis_of: (G,) index of each track's axis. starts: (G,) offset of each track's first key.
+    values: (S, C). tangents: in and out, both (S, C) per second, for CUBICSPLINE.
+    """
+
+    axes: tuple[TimeAxis, ...]
+    axis_of: Ints
+    starts: Ints
+    values: Floats
+    tangents: Tangents | None
+
+    def find_intervals(self, places: Mapping[TimeAxis, KeyInterval]) -> KeyInterval:
+        """Return the key intervals (F, G) of all tracks, from those of the axes at F times."""
+        found = [places[axis] for axis in self.axes]
+        left, right, u, duration = (
+            np.stack([getattr(each, name) for each in found], axis=1)[:, self.axis_of] for name in KeyInterval.__slots__
+        )
+        return KeyInterval(left + self.starts, right + self.starts, u, duration)
+
+    def is_inside(self, at: Floats) -> Bools:
+        """Return the mask (F, G) of the times from each track's first key on and before its last."""
+        first, last = (np.array([axis.times[k] for axis in self.axes]) for k in (0, -1))
+        inside = (at[:, None] >= first) & (at[:, None] < last)
+        return np.asarray(inside[:, self.axis_of])
+
+    def sample(self, at: Floats, place: KeyInterval) -> Floats:
+        """Return the values (F, G, C) at times `at` (F,). place: of `find_intervals`."""
+        del at
+        return interpolate(place, self.values, self.tangents, self.interpolation, self.kind)
+
+
+def mixed_batches(tracks: Iterable[Track]) -> tuple[list[LazyBatch], list[MixedBatch]]:
+    """Return `tracks` grouped by rule: those of one time axis, and those of several."""
+    tracks, groups = tuple(tracks), dict[Rule, list[int]]()
+    for i, track in enumerate(tracks):
+        groups.setdefault(_rule(track), []).append(i)
+    single, mixed = [], []
+    for group in groups.values():
+        chosen = tuple(tracks[i] for i in group)
+        axes = tuple(dict.fromkeys(track.time_axis for track in chosen))
+        if len(axes) == 1:
+            single.append(LazyBatch(chosen, np.array(group)))
+            continue
+        index = {axis: i for i, axis in enumerate(axes)}
+        axis_of = np.array([index[track.time_axis] for track in chosen])
+        counts = np.array([len(track.values) for track in chosen])
+        joined = _stack_values(chosen, np.concatenate)
+        mixed.append(MixedBatch(chosen, np.array(group), axes, axis_of, np.cumsum(counts) - counts, *joined))
+    return single, mixed
 
 
 def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:

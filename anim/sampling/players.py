@@ -18,8 +18,8 @@ from anim.arrays import Bools, Floats
 from anim.errors import RangeError, check_type
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, ValueKind
-from anim.sampling.batch import Batch
-from anim.sampling.pose import PoseSampler, Sampler
+from anim.sampling.batch import Batch, MixedBatch
+from anim.sampling.pose import PoseSampler, Sampler, sample_batch
 from anim.sampling.track import KeyInterval
 
 THREE_NLERP_DOT = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
@@ -67,24 +67,24 @@ def sampler(player: str) -> Sampler:
     """Return the function that samples tracks like a player, a name in PLAYERS."""
     chosen = PLAYERS[player]
     if chosen.between is None:
-        return Batch.sample
+        return sample_batch
     return lambda batch, at, place: _sample_batch(chosen, batch, at, place)
 
 
-def _sample_batch(player: PlayerModel, batch: Batch, at: Floats, place: KeyInterval) -> Floats:
-    """Values (F, G, C) of tracks on one time axis; players differ in LINEAR and STEP rotations only."""
+def _sample_batch(player: PlayerModel, batch: Batch | MixedBatch, at: Floats, place: KeyInterval) -> Floats:
+    """Values (F, G, C) of tracks; players differ in LINEAR and STEP rotations only."""
     if player.between is None or batch.kind is not ValueKind.ROTATION:
         return batch.sample(at, place)
     if batch.interpolation is Interpolation.CUBICSPLINE:
         return batch.sample(at, place)
     start = batch.values[place.left]
     held = quaternion.normalize(start) if player.normalizes else start
-    inside = (at >= batch.times[0]) & (at < batch.times[-1])
+    inside = batch.is_inside(at)
     if batch.interpolation is Interpolation.STEP or not inside.any():
         return held
     result = held.copy()
-    end = batch.values[place.right[inside]]
-    result[inside] = player.between(start[inside], end, place.u[inside][:, None, None])
+    end, u = batch.values[place.right[inside]], place.u[inside]
+    result[inside] = player.between(start[inside], end, u.reshape(u.shape + (1,) * (end.ndim - u.ndim)))
     return result
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from typing import TypeAlias
@@ -12,13 +12,13 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError
-from anim.model import Clip, Interpolation, Pose, Skeleton, ValueKind
+from anim.model import Clip, Interpolation, Pose, Skeleton, TimeAxis, ValueKind
 from anim.model.track import NUM_COMPONENTS
-from anim.sampling.batch import Batch, ConcatenatedTracks, concatenate, lazy_batches
+from anim.sampling.batch import Batch, ConcatenatedTracks, MixedBatch, concatenate, mixed_batches
 from anim.sampling.track import KeyInterval, find_interval
 from anim.sampling.world import world_by_node
 
-Sampler: TypeAlias = Callable[[Batch, Floats, KeyInterval], Floats]
+Sampler: TypeAlias = Callable[[Batch | MixedBatch, Floats, KeyInterval], Floats]
 
 
 def sample_pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
@@ -29,13 +29,18 @@ def sample_pose(skeleton: Skeleton, clip: Clip, at: Floats) -> Pose:
     return PoseSampler(skeleton, clip).at(at)
 
 
+def sample_batch(batch: Batch | MixedBatch, at: Floats, place: KeyInterval) -> Floats:
+    """Return the values (F, G, C) of a batch at times `at` (F,), as specified by glTF."""
+    return batch.sample(at, place)
+
+
 class PoseSampler:
     """Sampler of a clip on a skeleton for repeated use, with keys stacked on demand.
 
     sample: gives the values of tracks at times, by default as specified by glTF.
     """
 
-    def __init__(self, skeleton: Skeleton, clip: Clip, sample: Sampler = Batch.sample) -> None:
+    def __init__(self, skeleton: Skeleton, clip: Clip, sample: Sampler = sample_batch) -> None:
         self._skeleton = skeleton
         self._sample = sample
         nodes = len(skeleton)
@@ -46,8 +51,8 @@ class PoseSampler:
                 f"there is no node {highest} (the skeleton has {nodes}, from 0 on)",
                 where=f"clip '{clip.name}'" if clip.name else "",
             )
-        self._stacks = lazy_batches(moving)
-        self._time_axes = tuple(dict.fromkeys(stack.time_axis for stack in self._stacks))
+        self._stacks, self._mixed = mixed_batches(moving)
+        self._time_axes = tuple(dict.fromkeys(track.time_axis for track in moving))
 
     def sampled(self, sample: Sampler) -> PoseSampler:
         """Return the sampler of the same clip and skeleton with another sampling function for tracks."""
@@ -66,8 +71,7 @@ class PoseSampler:
         parts = {path: _rest_values(getattr(self._skeleton, path), frames) for path in NUM_COMPONENTS}
         weights: dict[int, Floats] = {}
         places = {axis: find_interval(axis.times, at) for axis in self._time_axes}
-        for stack in self._stacks:
-            batch, place = stack.at(places[stack.time_axis])
+        for batch, place in self._located(places):
             used = samples if batch.kind is ValueKind.ROTATION else samples[:1]
             values = np.concatenate([sample(batch, at, place) for sample in used])
             numbers = [track.node for track in batch.tracks if track.node is not None]
@@ -78,6 +82,13 @@ class PoseSampler:
             part.reshape(len(samples) // len(used), len(values), *part.shape[1:])[:, :, numbers] = values
         times = at if len(samples) == 1 else _repeated(at, frames)
         return Pose(times, parts["translation"], parts["rotation"], parts["scale"], weights)
+
+    def _located(self, places: Mapping[TimeAxis, KeyInterval]) -> Iterator[tuple[Batch | MixedBatch, KeyInterval]]:
+        """Yield every batch with the key intervals of its tracks."""
+        for stack in self._stacks:
+            yield stack.at(places[stack.time_axis])
+        for mixed in self._mixed:
+            yield mixed, mixed.find_intervals(places)
 
     def posed(self, at: Floats) -> PosedSkeleton:
         """Return the skeleton at times `at` (F,) in seconds."""
