@@ -15,7 +15,7 @@ from anim.optimization.search.plan import Solution, TrackAction, TrialResult, va
 from anim.optimization.search.search import search
 from anim.optimization.search.source_motion import PATHS, SourceMotion, analyze_source, key_grid
 from anim.optimization.search.trial import CHORD_BOUND_FRACTION, BoundUsage, TrialRunner
-from anim.optimization.tracks import clip_ends, key_reduction, morph_weights
+from anim.optimization.tracks import clip_ends, key_reduction, morph_weights, quantization
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
 
@@ -30,12 +30,14 @@ class Task:
 
     shared: per track, constants that other clips use for the same property, the most frequent first.
     unused: (tracks of the clip) whether every clip keeps the property at its rest value. bound: m, for the search.
+    at_rest: (tracks of the clip) whether it stays so close to its rest value that no search is needed; empty: unknown.
     """
 
     clip: Clip
     shared: tuple[tuple[Floats, ...], ...]
     unused: tuple[bool, ...]
     bound: float
+    at_rest: tuple[bool, ...] = ()
 
 
 def solve(context: Context, task: Task) -> Solution | None:
@@ -54,6 +56,7 @@ class _TrackSorter:
         self._dropped: list[int] = []
         self._free: list[int] = []
         self._spent = 0.0
+        self._single_axis: TimeAxis | None = None
         for i, track in enumerate(task.clip.tracks):
             self._sort(i, track)
         self._reduce_weights()
@@ -86,8 +89,23 @@ class _TrackSorter:
             track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or self._is_off_unit(track)
         ):
             self._keep_exactly(i)
+        elif self._task.at_rest and self._task.at_rest[i]:
+            self._settle(i, track)
         else:
             self._free.append(i)
+
+    def _settle(self, i: int, track: Track) -> None:
+        """Drop a track at rest, or store its rest value as a single key."""
+        if self._is_droppable(i):
+            self._dropped.append(i)
+            return
+        assert track.node is not None
+        rest = getattr(self._context.skeleton, track.path)[track.node]
+        sign = -1.0 if track.path == "rotation" and track.values[0] @ rest < 0 else 1.0
+        axis = self._single_axis or TimeAxis(times.key_times(np.array([self._clip.start])))
+        self._single_axis = axis
+        stored = quantization.constant_cost(sign * rest)
+        self._done[i] = _new_track(track, axis, stored), stored
 
     def _is_off_unit(self, track: Track) -> bool:
         """Return whether rotations are so far from unit length that players without normalization differ."""

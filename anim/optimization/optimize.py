@@ -104,11 +104,12 @@ def _visible_clips(request: Request, scene: Scene) -> Request:
 
 def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:
     shared = find_constants(optimizer.context(), optimizer.clips)
-    tasks = []
+    tasks, max_error = [], optimizer.request.bounds.max_error
     for i in chosen:
         clip = optimizer.clips[i]
         targets = [(-1 if track.node is None else track.node, track.path) for track in clip.tracks]
         values = tuple(shared.values.get(target, ()) for target in targets)
         unused = tuple(target in shared.unused for target in targets)
-        tasks.append((i, Task(clip, values, unused, SEARCH_BOUND_FRACTION * optimizer.request.bounds.max_error)))
+        at_rest = shared.at_rest(i, max_error)
+        tasks.append((i, Task(clip, values, unused, SEARCH_BOUND_FRACTION * max_error, at_rest)))
     return tasks
