@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.joined_groups import JoinedGroups
+from anim.measure.error.combined_groups import CombinedGroups
 from anim.measure.error.point_groups import Binding, PointGroups, SkinnedGroups
 from anim.measure.error.shell_points import ShellPoints
 
@@ -45,7 +45,7 @@ class InfluenceRadius:
 
 def influence_radius(part: PointGroups) -> InfluenceRadius | None:
     """Return the influence radius of a surface's joints; None if the second version has other joints."""
-    if isinstance(part, JoinedGroups):
+    if isinstance(part, CombinedGroups):
         each = [influence_radius(one) for one in part.parts if len(one.groups)]
         known = [one for one in each if one is not None]
         return join_reaches(known) if known and len(known) == len(each) else None

@@ -49,10 +49,10 @@ class Prover:
 
     def __init__(self, ruler: ErrorMetric) -> None:
         self.ruler = ruler
-        found = [(i, influence_radius(part)) for i, part in enumerate(ruler.joined) if len(part.groups)]
+        found = [(i, influence_radius(part)) for i, part in enumerate(ruler.combined) if len(part.groups)]
         self._reaches = [each for _, each in found if each is not None]
         self._order = [i for i, each in found if each is not None]
-        self._parts = [ruler.joined[i] for i in self._order]
+        self._parts = [ruler.combined[i] for i in self._order]
         a, b = ruler.scene.skeleton, ruler.other.skeleton
         same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
         self._knows_all = same and len(self._parts) == len(found)

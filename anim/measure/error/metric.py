@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, unique_sorted
 from anim.measure.compare.correspondence import Correspondence, match_scenes
+from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import max_displacement
-from anim.measure.error.joined_groups import join_groups
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
@@ -82,6 +82,7 @@ class ErrorMetric:
 
     other: the scene of the second clip: with another rest pose, other node indices, another file. The first scene's
     surface is moved by both scenes, so that only motion counts (`anim.measure.compare.correspondence`).
+    combined: the parts without morph targets as one, then the others.
     shell: as a fraction of the diagonal, the distance of six points around each node that moves no vertex; None ignores
     such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
     """
@@ -95,7 +96,7 @@ class ErrorMetric:
         if shell is not None:
             nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, found) & (self.pairs.nodes >= 0))
             self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
-        self.joined = join_groups(self.parts)
+        self.combined = combine_groups(self.parts)
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
         """Return the error of `after` at the times of `dense_times`.
@@ -116,7 +117,8 @@ class ErrorMetric:
     ) -> ErrorSamples:
         """Return the largest error in any of the players at `times` (F,), with limits for all times and groups."""
         limits = {
-            player: [np.zeros((len(part.groups), len(times)), np.float32) for part in self.joined] for player in players
+            player: [np.zeros((len(part.groups), len(times)), np.float32) for part in self.combined]
+            for player in players
         }
         return ErrorSamples(*self._sampled(before, after, times, players, limits), limits)
 
@@ -133,10 +135,10 @@ class ErrorMetric:
         first = 0
         for block in self._blocks_of_players(before, after, times, players):
             count = len(block.times) // len(players)
-            shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.joined))
+            shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.combined))
             fields = [(i, field) for i, field in shown if field is not None]
             for i, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
-                part = self.joined[i]
+                part = self.combined[i]
                 found = max_displacement(field, floor=max(size, NOISE * self.diagonal), slack=SLACK, most=MAX_SEARCHED)
                 if limits is not None:
                     rounded = _round_up(found.limits).reshape(-1, len(players), count)

@@ -62,3 +62,23 @@ def test_a_spline_that_moves_between_equal_keys_is_no_constant_and_not_unused() 
 def test_pointers_and_weights_have_no_part_in_it() -> None:
     found = _known(clip(track("/materials/0/alphaCutoff", [0], [[1]]), track("weights", [0], [[1]], node=5)))
     assert (found.unused, found.values) == (frozenset(), {})
+
+
+def test_tracks_at_rest_are_found_for_all_clips(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same with few keys a call; q and −q are one rotation, and a spline can move between equal keys."""
+    rest, place = OF.skeleton.rotation[2], OF.skeleton.translation[2]
+    slopes = np.array([[0, 0, 0], [1.0, 0, 0]])
+    waving = track("translation", [0, 1], np.tile(place, (2, 1)), CUBICSPLINE, tangents=(slopes, slopes), node=2)
+    clips = [
+        _held("rotation", -rest),
+        clip(),
+        clip(track("weights", [0], [[0]], node=5), track("translation", [0], [place + 0.1], node=2)),
+        clip(waving, track("rotation", [0], [rest], node=1)),
+    ]
+    found = _known(*clips)
+    rotation = np.allclose(OF.skeleton.rotation[1], rest)
+    expected = [(True,), (), (False, False), (False, rotation)]
+    assert [found.at_rest(i, 1e-3) for i in range(4)] == expected
+    monkeypatch.setattr("anim.optimization.shared_constants.MAX_STACKED_KEYS", 1)
+    again = _known(*clips)
+    assert all(np.array_equal(a, b) for a, b in zip(found.from_rest, again.from_rest, strict=True))

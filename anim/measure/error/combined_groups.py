@@ -17,7 +17,7 @@ from anim.sampling.pose import PosedSkeleton
 NUM_CORNERS = 8  # of a joint's box
 
 
-class JoinedGroups:
+class CombinedGroups:
     """Points of several surfaces and shells, their groups and joints in order.
 
     parts: without morph targets. groups, reach: as of `SkinnedGroups`, of all parts.
@@ -86,7 +86,7 @@ class JoinedGroups:
         return self.parts[number], int(self._firsts[number])
 
 
-def join_groups(parts: Sequence[PointGroups]) -> list[PointGroups]:
+def combine_groups(parts: Sequence[PointGroups]) -> list[PointGroups]:
     """Return all parts without morph targets as one, then the others."""
     plain: list[SkinnedGroups | ShellPoints] = []
     others: list[PointGroups] = []
@@ -95,7 +95,7 @@ def join_groups(parts: Sequence[PointGroups]) -> list[PointGroups]:
             plain.append(part)
         else:
             others.append(part)
-    return [*([JoinedGroups(plain)] if plain else []), *others]
+    return [*([CombinedGroups(plain)] if plain else []), *others]
 
 
 def _bound(part: SkinnedGroups | ShellPoints) -> BoundGroups:
