@@ -9,6 +9,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
+from anim.simulation.spring_bones.angle_limits import AngleLimits
 from anim.simulation.spring_bones.chains import SpringJoint
 from anim.simulation.spring_bones.colliders import Collider
 from anim.simulation.spring_bones.collisions import TINY, Collisions, cofactors, norms
@@ -63,6 +64,8 @@ class Batch:
         self._rest = skeleton.rotation[nodes]
         self._rotation: Floats = self._rest.copy()
         self._axis = np.array([_unit(tail_at_rest(skeleton, joint)) for joint in self._joints])
+        limits = [joint.limit for joint in self._joints]
+        self._limits = AngleLimits(limits, self._axis) if any(limits) else None
         self._from_direction, self._opposite = _rotation_maps(self._rest, self._axis)
 
     def load(self, chunk: DriverChunk) -> None:
@@ -104,8 +107,11 @@ class Batch:
         tail = self._model.predict(head, head + bone, center)
         offset = tail - head
         tail = free = head + offset * (length / np.maximum(norms(offset), TINY))
+        limits, rest = self._limits, columns[..., :3]
+        limit = None if limits is None else lambda points: limits.resolve(rest, head, length, points)
+        tail = tail if limit is None else limit(tail)
         if self._collisions is not None:
-            tail = self._collisions.resolve(world, head, length, tail)
+            tail = self._collisions.resolve(world, head, length, tail, limit)
         self._model.accept(head, free, tail, center)
         self.tails = tail
         self._rotation = self._rotations(columns, tail - head)

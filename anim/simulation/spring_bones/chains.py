@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from anim.simulation.spring_bones.angle_limits import AngleLimit
 from anim.simulation.spring_bones.colliders import ORIGIN, Collider, Vector, check_quantity, check_vector
 
 DEFAULT_STIFFNESS = 1.0  # VRMC_springBone's schema, as all defaults here
@@ -52,13 +53,14 @@ class SpringJoint:
     """A joint that rotates, and its tail: the point whose motion is simulated.
 
     node: index of the rotating node. tail: index of a descendant, or None.
-    tail_offset: (3,) m, the tail in the joint's space if there is no such node.
+    tail_offset: (3,) m, the tail in the joint's space if there is no such node. limit: of its direction.
     """
 
     node: int
     tail: int | None
     parameters: SpringParameters
     tail_offset: Vector = ORIGIN
+    limit: AngleLimit | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tail_offset", check_vector(self.tail_offset, "tail offset"))

@@ -6,7 +6,7 @@ Source: VRMC_springBone 1.0 and VRMC_springBone_extended_collider 1.0, reference
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,8 +57,18 @@ class Collisions:
         own = [[position[index] for index in each] for each in chosen]
         self._rounds = [_round(table, own, hit_radius, k) for k in range(max(map(len, chosen)))]
 
-    def resolve(self, world: Floats, head: Floats, length: Floats, tail: Floats) -> Floats:
-        """Return the tails (m, 3) pushed out of all colliders, at their distance `length` (m, 1) from `head` (m, 3)."""
+    def resolve(
+        self,
+        world: Floats,
+        head: Floats,
+        length: Floats,
+        tail: Floats,
+        limit: Callable[[Floats], Floats] | None = None,
+    ) -> Floats:
+        """Return the tails (m, 3) pushed out of all colliders, at their distance `length` (m, 1) from `head` (m, 3).
+
+        limit: returns the tails within the limits of their directions; called after each collision.
+        """
         matrices = world[self._nodes]
         points = np.matmul(matrices, self._points)
         normals = self._world_normals(matrices)
@@ -71,6 +81,7 @@ class Collisions:
                 moved = own[hit] - direction[hit] * distance[hit] - head[joint]
                 tail = tail.copy()
                 tail[joint] = head[joint] + moved * (length[joint] / np.maximum(norms(moved), TINY))
+                tail = tail if limit is None else limit(tail)
         return np.asarray(tail)
 
     def _world_normals(self, matrices: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""VRMC_springBone 1.0, with VRMC_springBone_extended_collider, → SpringBones.
+"""VRMC_springBone 1.0, with VRMC_springBone_extended_collider and VRMC_springBone_limit, → SpringBones.
 
 Source: the extensions' specifications and JSON schemas, which state the defaults.
 """
@@ -10,7 +10,8 @@ from itertools import pairwise
 from typing import Any
 
 from anim.gltf.document import Json, json_array
-from anim.gltf.validation.rules import ObjectRule, check_property, index, list_of, number, numbers, of_type, text
+from anim.gltf.validation.rules import Check, ObjectRule, check_property, index, list_of, number, numbers, of_type, text
+from anim.simulation.spring_bones.angle_limits import IDENTITY, AngleLimit, LimitShape
 from anim.simulation.spring_bones.chains import (
     DEFAULT_DRAG,
     DEFAULT_STIFFNESS,
@@ -33,7 +34,10 @@ from anim.simulation.spring_bones.json_values import (
 EXTENSION = "VRMC_springBone"
 EXTENDED = "VRMC_springBone_extended_collider"
 LIMIT = "VRMC_springBone_limit"
-VERSIONS = ("1.0", "1.0-draft")  # of the extended colliders; another version falls back to the plain shape
+VERSIONS = ("1.0", "1.0-draft")  # of both; another version is left out: plain shapes, no limits
+_ANGLE = ObjectRule({"angle": number, "rotation": numbers(4)}, ("angle",))
+_PITCH_YAW = ObjectRule({"pitch": number, "yaw": number, "rotation": numbers(4)}, ("pitch", "yaw"))
+LIMIT_SHAPES: dict[str, Check] = {"cone": _ANGLE, "hinge": _ANGLE, "spherical": _PITCH_YAW}
 
 
 def read(extension: Any, json: Json) -> SpringBones:
@@ -54,7 +58,12 @@ def read(extension: Any, json: Json) -> SpringBones:
 
 def _chain(spring: Json, groups: list[tuple[int, ...]]) -> SpringChain:
     joints = tuple(
-        SpringJoint(one["node"], other["node"], locate(f"joints[{i}]", _parameters, one))
+        SpringJoint(
+            one["node"],
+            other["node"],
+            locate(f"joints[{i}]", _parameters, one),
+            limit=locate(f"joints[{i}].extensions.{LIMIT}.limit", _limit, one),
+        )
         for i, (one, other) in enumerate(pairwise(spring["joints"]))
     )
     colliders = dict.fromkeys(index for group in spring.get("colliderGroups", []) for index in groups[group])
@@ -71,6 +80,16 @@ def _parameters(joint: Json) -> SpringParameters:
     )
 
 
+def _limit(joint: Json) -> AngleLimit | None:
+    extension = joint.get("extensions", {}).get(LIMIT, {})
+    if extension.get("specVersion") not in VERSIONS:
+        return None
+    kind, about = next((kind, extension["limit"][kind]) for kind in LIMIT_SHAPES if kind in extension["limit"])
+    angle = about["pitch" if kind == "spherical" else "angle"]
+    rotation = about.get("rotation", IDENTITY)
+    return AngleLimit(LimitShape(kind), angle, about.get("yaw", 0.0), tuple(rotation))
+
+
 def _collider(collider: Json) -> Collider:
     extended = collider.get("extensions", {}).get(EXTENDED, {})
     shape = extended.get("shape") if extended.get("specVersion") in VERSIONS else None
@@ -78,16 +97,16 @@ def _collider(collider: Json) -> Collider:
 
 
 def _notes(extension: Json) -> Iterator[str]:
-    joints = (joint for spring in extension.get("springs", []) for joint in spring["joints"])
-    if any(LIMIT in joint.get("extensions", {}) for joint in joints):
-        yield f"angle limits ({LIMIT}) are not evaluated"
-    versions = {
-        found["specVersion"]
-        for each in extension.get("colliders", [])
-        if (found := each.get("extensions", {}).get(EXTENDED)) and found["specVersion"] not in VERSIONS
-    }
-    for version in sorted(versions):
+    joints = [joint for spring in extension.get("springs", []) for joint in spring["joints"][:-1]]
+    for version in _unknown_versions(joints, LIMIT):
+        yield f"{LIMIT} {version} is unknown: its angle limits are not applied"
+    for version in _unknown_versions(extension.get("colliders", []), EXTENDED):
         yield f"{EXTENDED} {version} is unknown: the plain shapes of its colliders are used"
+
+
+def _unknown_versions(objects: list[Json], name: str) -> list[str]:
+    found = {each["extensions"][name]["specVersion"] for each in objects if name in each.get("extensions", {})}
+    return sorted(found - set(VERSIONS))
 
 
 def _check(extension: Any, node: Any) -> None:
@@ -110,11 +129,18 @@ def _spring_rule(node: Any, groups: Any) -> ObjectRule:
             "node": node,
             **dict.fromkeys(("stiffness", "dragForce", "gravityPower", "hitRadius"), number),
             "gravityDir": numbers(3),
-            "extensions": ObjectRule({}),
+            "extensions": ObjectRule({LIMIT: _limit_rule}),
         },
         ("node",),
     )
     return ObjectRule({"name": text, "joints": list_of(joint), "colliderGroups": groups, "center": node}, ("joints",))
+
+
+def _limit_rule(value: Any) -> None:
+    """Check the extension of a joint; of other versions only that they have one."""
+    ObjectRule({"specVersion": text}, ("specVersion",))(value)
+    if value["specVersion"] in VERSIONS:
+        ObjectRule({"limit": one_of_shapes(LIMIT_SHAPES)}, ("limit",))(value)
 
 
 def _collider_rule(node: Any) -> ObjectRule:

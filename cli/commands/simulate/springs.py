@@ -106,9 +106,9 @@ def command(
 ) -> None:
     """Simulate the secondary motion of hair, tails and ears, and write it as rotation tracks of the clip.
 
-    Chains and colliders are those of the file (VRMC_springBone with extended colliders, or VRM 0.x), of a .json file,
-    or the joints below --chain, which swing at 2.5 Hz without --stiffness, --drag or --frequency. Parameters given as
-    options replace those of all chains. Rotation tracks of the joints are replaced, others stay.
+    Chains and colliders are those of the file (VRMC_springBone with extended colliders and angle limits, or VRM 0.x),
+    of a .json file, or the joints below --chain, which swing at 2.5 Hz without --stiffness, --drag or --frequency.
+    Parameters given as options replace those of all chains. Rotation tracks of the joints are replaced, others stay.
 
     VRM's drag is per step, so players show the motion of 1/60 s: another --step is another motion. With --frequency
     each joint is a damped oscillator instead, solved exactly, and stable at every step. Its damping is relative to the

@@ -50,13 +50,8 @@ class Rig:
         self.scales = [np.array(node.get("scale", (1, 1, 1)), float) for node in nodes]
 
     def local(self, node: int, rotation: Array | None = None) -> Array:
-        x, y, z, w = self.rotations[node] if rotation is None else rotation
         matrix = np.eye(4)
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
+        matrix[:3, :3] = _matrix(self.rotations[node] if rotation is None else rotation)
         matrix[:3, :3] *= self.scales[node]
         matrix[:3, 3] = self.positions[node]
         return matrix
@@ -173,15 +168,57 @@ def _advance(rig: Rig, spring: Spring, dt: float, tails: dict[int, Array] | None
     tail: Array = _at(to_world, spring.now + (spring.now - spring.before) * (1 - about.get("dragForce", drag)))
     tail = tail + _unit(at_rest[:3, :3] @ spring.axis) * about.get("stiffness", 1.0) * dt
     tail = tail + np.array(about.get("gravityDir", (0, -1, 0)), float) * about.get("gravityPower", 0.0) * dt
-    tail = head + _unit(tail - head) * length
+    tail = _within(spring, at_rest, head, head + _unit(tail - head) * length)
     for collider in spring.colliders:
         extended = collider.get("extensions", {}).get("VRMC_springBone_extended_collider", collider)
         direction, distance = _push(extended["shape"], rig.world(collider["node"]), tail, about.get("hitRadius", 0.0))
         if distance < 0:
-            tail = head + _unit(tail - direction * distance - head) * length
+            tail = _within(spring, at_rest, head, head + _unit(tail - direction * distance - head) * length)
     spring.before, spring.now = spring.now, _at(np.asarray(np.linalg.inv(to_world)), tail)
     rig.rotations[spring.node] = _product(
         spring.rest, _between(spring.axis, _unit(_at(np.asarray(np.linalg.inv(at_rest)), tail)))
+    )
+
+
+def _within(spring: Spring, at_rest: Array, head: Array, tail: Array) -> Array:
+    """Return the tail within the joint's limit, by the appendix of VRMC_springBone_limit."""
+    extension = spring.about.get("extensions", {}).get("VRMC_springBone_limit")
+    if extension is None:
+        return tail
+    kind, limit = next(iter(extension["limit"].items()))
+    x, y, z = spring.axis
+    upright = np.array([1.0, 0, 0, 0]) if y == -1 else _unit(np.array([z, 0, -x, y + 1]))
+    turn = _matrix(_product(upright, np.array(limit.get("rotation", (0, 0, 0, 1)), float)))
+    frame = at_rest[:3, :3] / np.linalg.norm(at_rest[:3, :3], axis=0) @ turn
+    return np.asarray(head + frame @ limited(kind, limit, _unit(frame.T @ (tail - head))) * np.linalg.norm(tail - head))
+
+
+def limited(kind: str, limit: Json, d: Array) -> Array:
+    """Return a unit direction within a limit, in the limit's space."""
+    if kind == "spherical":
+        most_pitch, most_yaw = min(limit["pitch"], np.pi), min(limit["yaw"], np.pi / 2)
+        pitch = np.pi if d[1] == -1 else 0.0 if abs(d[0]) == 1 else np.arctan2(d[2], d[1])
+        pitch, yaw = max(-most_pitch, min(most_pitch, pitch)), max(-most_yaw, min(most_yaw, np.arcsin(d[0])))
+        return np.array([np.sin(yaw), np.cos(yaw) * np.cos(pitch), np.cos(yaw) * np.sin(pitch)])
+    angle = min(limit["angle"], np.pi)
+    if kind == "hinge":
+        d = np.array([0, d[1], d[2]]) if d[1] or d[2] else np.array([0, 1.0, 0])
+        d = _unit(d)
+    if d[1] >= np.cos(angle):
+        return d
+    around = np.array([d[0], 0, d[2]])
+    around = _unit(around) if around.any() else np.array([0, 0, 1.0])
+    return np.asarray(np.sin(angle) * around + np.array([0, np.cos(angle), 0]))
+
+
+def _matrix(q: Array) -> Array:
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
     )
 
 

@@ -15,6 +15,7 @@ from anim.errors import AnimError, FormatError, NotFoundError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Skeleton
+from anim.simulation.spring_bones.angle_limits import AngleLimit, LimitShape
 from anim.simulation.spring_bones.chains import SpringBones, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.json_reader import read_spring_file
@@ -22,7 +23,7 @@ from anim.simulation.spring_bones.read import read_spring_bones
 from tests.anim.simulation.spring_bones.test_chain_globs import rig
 from tests.files import opened_fixture, opened_path
 
-SPRINGS, EXTENDED = "VRMC_springBone", "VRMC_springBone_extended_collider"
+SPRINGS, EXTENDED, LIMIT = "VRMC_springBone", "VRMC_springBone_extended_collider", "VRMC_springBone_limit"
 NODES = [{"name": "a", "children": [1]}, {"name": "b", "translation": [0, 0, -2], "children": [2]}, {"name": "c"}]
 
 
@@ -65,10 +66,40 @@ def test_an_extended_collider_replaces_its_fallback() -> None:
         assert bool(bones.notes) == (shape == "sphere")
 
 
-def test_angle_limits_are_noted() -> None:
-    limited = {"node": 0, "extensions": {"VRMC_springBone_limit": {}}}
-    bones = vrm1(springs=[{"joints": [limited, {"node": 1}]}])
-    assert bones.notes == ("angle limits (VRMC_springBone_limit) are not evaluated",)
+def limited(**extension: Any) -> Any:
+    """A spring with a limit on its first joint, and an unknown one on its last, which counts nowhere."""
+    first = {"node": 0, "extensions": {LIMIT: extension}}
+    return [{"joints": [first, {"node": 1, "extensions": {LIMIT: {"specVersion": "0.1"}}}]}]
+
+
+def test_angle_limits_are_read() -> None:
+    limit = {"spherical": {"pitch": 0.5, "yaw": 0.25, "rotation": [1, 0, 0, 0]}}
+    bones = vrm1(springs=limited(specVersion="1.0-draft", limit=limit))
+    (joint,) = bones.chains[0].joints
+    assert joint.limit == AngleLimit(LimitShape.SPHERICAL, 0.5, 0.25, (1, 0, 0, 0))
+    assert bones.notes == ()
+
+
+def test_angle_limits_of_an_unknown_version_are_noted() -> None:
+    bones = vrm1(springs=limited(specVersion="7.0", limit={"cube": {}}))
+    assert bones.chains[0].joints[0].limit is None
+    assert bones.notes == ("VRMC_springBone_limit 7.0 is unknown: its angle limits are not applied",)
+
+
+@pytest.mark.parametrize(
+    ("limit", "problem"),
+    [
+        ({}, "limit: has no shape"),
+        ({"cone": {"angle": 1}, "hinge": {"angle": 1}}, "limit: has cone and hinge"),
+        ({"cone": {}}, "cone: has no 'angle'"),
+        ({"cone": {"angle": -1}}, "limit: angle is -1"),
+        ({"spherical": {"pitch": 1}}, "spherical: has no 'yaw'"),
+        ({"hinge": {"angle": 1, "rotation": [0, 0, 0, 0]}}, r"limit: rotation is \(0, 0, 0, 0\)"),
+    ],
+)
+def test_bad_angle_limits_are_named(limit: Any, problem: str) -> None:
+    with pytest.raises(FormatError, match=rf"springs\[0\].joints\[0\].extensions.{LIMIT}.*{problem}"):
+        vrm1(springs=limited(specVersion="1.0-draft", limit=limit))
 
 
 def test_a_spring_of_one_joint_has_nothing_to_swing() -> None:
