@@ -82,6 +82,9 @@ def command(
     Cubic easings (smoothstep, quad, cubic, back, bounce, hermite) are written exactly as CUBICSPLINE, others with as
     few keys as --tolerance allows; steps() becomes STEP. STEP tracks stay unchanged. Easings that overshoot exceed the
     values of the keys; the effect on scale and weights is reported.
+
+    Easings are those of easings.net, but expo and elastic are scaled to be exactly 0 at the start and 1 at the end. The
+    forms of easings.net, and of Penner, jump there: the difference is up to 0.001 of the key interval's change.
     """
     if list_eases:
         documents.write_text(_table())
@@ -178,7 +181,8 @@ def _table() -> str:
     lines = [f"{name:{width}}  {sparkline(each)}{_mark(each)}" for name, each in EASINGS.items()]
     makers = [f"{maker.usage}" for maker in EASING_FACTORIES.values()]
     exact = "exact: written as CUBICSPLINE without any error; others within --tolerance"
-    return "\n".join([*lines, "", "with arguments:", *(f"  {each}" for each in makers), "", exact]) + "\n"
+    scaled = "expo, elastic: scaled to be 0 at the start and 1 at the end; easings.net's differ by up to 0.001"
+    return "\n".join([*lines, "", "with arguments:", *(f"  {each}" for each in makers), "", exact, scaled]) + "\n"
 
 
 def _mark(easing: Easing) -> str:

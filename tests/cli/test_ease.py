@@ -13,6 +13,7 @@ from tests.files import clips_of
 
 def test_list_shows_every_ease_with_its_shape(call: Call) -> None:
     lines = call("ease", "--list").text.splitlines()
+    assert "easings.net's differ by up to 0.001" in lines[-1]
     shown = {line.split()[0] for line in lines if "▁" in line or "█" in line}
     assert shown == set(EASINGS)
     assert any("cubic-bezier(" in line for line in lines)

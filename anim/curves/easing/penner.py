@@ -1,7 +1,8 @@
 """Penner's easings: eleven curves, each as in (slow start), out (slow end) and in-out.
 
-Source: Penner, "Programming Macromedia Flash MX" 2002, ch. 7; constants as on easings.net. Two differences, both
-below 0.001: expo and elastic are scaled to reach 0 and 1 exactly, where the originals jump by 2⁻¹⁰.
+Source: Penner, "Programming Macromedia Flash MX" 2002, ch. 7; constants as on easings.net. One difference: expo and
+elastic are scaled to begin at 0 and end at 1, as in d3-ease. The published forms jump there; they differ by up to 2⁻¹⁰,
+in-out forms by half of that.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from anim.curves.easing.function import Easing, evaluate
 from anim.curves.easing.table import EASINGS, parse
 from tests.anim.curves.easing.eases import FAMILIES, SMOOTH, STEPS, U
 
+ROOT = Path(__file__).resolve().parents[4]
 EDGES = np.array([0.0, 1.0])
 
 
@@ -86,6 +88,7 @@ def easings_net(name: str, x: float) -> float:
         "quint-in-out": lambda: 16 * x**5 if x < 0.5 else 1 - (-2 * x + 2) ** 5 / 2,
         "sine-in": lambda: 1 - math.cos(x * math.pi / 2),
         "sine-in-out": lambda: -(math.cos(math.pi * x) - 1) / 2,
+        "expo-in": lambda: 2 ** (10 * x - 10),
         "expo-out": lambda: 1 - 2 ** (-10 * x),
         "expo-in-out": lambda: 2 ** (20 * x - 10) / 2 if x < 0.5 else (2 - 2 ** (-20 * x + 10)) / 2,
         "circ-in": lambda: 1 - math.sqrt(1 - x**2),
@@ -130,6 +133,31 @@ def bounce(x: float) -> float:
 def test_agrees_with_the_published_formula(name: str, tolerance: float) -> None:
     u = U[3:-3:13]
     np.testing.assert_allclose(EASINGS[name].value(u), [easings_net(name, float(x)) for x in u], atol=tolerance)
+
+
+@pytest.mark.parametrize("family", ["expo", "elastic"])
+def test_scaled_easings_reach_both_ends_and_differ_from_the_published_ones_by_a_thousandth(family: str) -> None:
+    """The figure of `ease --help`, `ease --list` and the page on easings; u = 0 and 1 are the limits from inside."""
+    u = np.linspace(0, 1, 20001)
+    for form, largest in (("in", 2.0**-10), ("out", 2.0**-10), ("in-out", 2.0**-11)):
+        name = f"{family}-{form}"
+        found = EASINGS[name].value(u)
+        published = np.array([easings_net(name, float(x)) for x in u])
+        assert (found[0], found[-1]) == (0, 1)
+        assert max(abs(published[0]), abs(published[-1] - 1)) > 5e-5
+        assert 0.998 * largest < np.abs(found - published).max() <= largest
+
+
+def test_the_largest_difference_from_other_libraries_is_stated() -> None:
+    page = (ROOT / "docs/ideas/easing.md").read_text(encoding="utf-8")
+    assert f"2⁻¹⁰ ≈ {2.0**-10:.3f}" in page
+    u = np.linspace(0, 1, 2001)
+    beziers = {"expo-in": "0.7, 0, 0.84, 0", "expo-out": "0.16, 1, 0.3, 1", "expo-in-out": "0.87, 0, 0.13, 1"}
+    far = max(
+        float(np.abs(EASINGS[name].value(u) - parse(f"cubic-bezier({handles})").value(u)).max())
+        for name, handles in beziers.items()
+    )
+    assert f"differs by up to {far:.2f}" in page
 
 
 def bezier(x1: float, y1: float, x2: float, y2: float, u: float) -> float:
