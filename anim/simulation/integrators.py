@@ -41,7 +41,8 @@ class System(Protocol):
 class Integrator:
     """One time integrator.
 
-    about: for `--help`. order: of the error in h; 1 for both Verlet forms if forces depend on velocity.
+    about: its effect on energy, for `--help`. order: of the error in h, if acceleration depends on position and time
+    alone. drag_order: the same if it depends on velocity too: both Verlet forms take drag at an earlier velocity.
     limit: largest stable ωh of the undamped oscillator; 0 if it grows at every step size, infinite if it never does.
     gain: amplitude factor per step, of arrays of ωh. drag_gain: of the velocity of x″ = −r x′, of arrays of rh.
     drag_limit: largest rh at which it is 1 or less.
@@ -50,6 +51,7 @@ class Integrator:
 
     about: str
     order: int
+    drag_order: int
     limit: float
     gain: Callable[[Floats], Floats]
     step: Step
@@ -125,22 +127,17 @@ def _rk4_drag_gain(z: Floats) -> Floats:
 RK4_DRAG_LIMIT = 2.7852935634052816  # root of the polynomial − 1
 INTEGRATORS = {
     "explicit-euler": Integrator(
-        "order 1, gains energy", 1, 0.0, lambda w: np.sqrt(1 + w * w), _explicit_euler, _euler_drag_gain, 2.0
+        "gains energy", 1, 1, 0.0, lambda w: np.sqrt(1 + w * w), _explicit_euler, _euler_drag_gain, 2.0
     ),
-    "symplectic-euler": Integrator(
-        "order 1, keeps energy", 1, 2.0, _verlet_gain, _symplectic_euler, _euler_drag_gain, 2.0
-    ),
+    "symplectic-euler": Integrator("keeps energy", 1, 1, 2.0, _verlet_gain, _symplectic_euler, _euler_drag_gain, 2.0),
     "verlet": Integrator(
-        "order 2, keeps energy", 2, 2.0, _verlet_gain, _symplectic_euler, _verlet_drag_gain, 4.0, staggered=True
+        "keeps energy", 2, 1, 2.0, _verlet_gain, _symplectic_euler, _verlet_drag_gain, 4.0, staggered=True
     ),
-    "velocity-verlet": Integrator(
-        "as verlet, velocities in step", 2, 2.0, _verlet_gain, _velocity_verlet, _verlet_drag_gain, 4.0
-    ),
-    "rk4": Integrator(
-        "order 4, loses little energy", 4, 2 * np.sqrt(2.0), _rk4_gain, _rk4, _rk4_drag_gain, RK4_DRAG_LIMIT
-    ),
+    "velocity-verlet": Integrator("keeps energy", 2, 1, 2.0, _verlet_gain, _velocity_verlet, _verlet_drag_gain, 4.0),
+    "rk4": Integrator("loses little energy", 4, 4, 2 * np.sqrt(2.0), _rk4_gain, _rk4, _rk4_drag_gain, RK4_DRAG_LIMIT),
     "implicit-euler": Integrator(
-        "order 1, stable, loses energy",
+        "stable, loses energy",
+        1,
         1,
         np.inf,
         lambda w: 1 / np.sqrt(1 + w * w),

@@ -59,7 +59,9 @@ def command(
     ] = None,
     ease: Annotated[
         list[str] | None,
-        typer.Option("--ease", metavar="NAME", help="Draw this easing instead of tracks, see ease --list; may be repeated."),
+        typer.Option(
+            "--ease", metavar="NAME", help="Draw this easing instead of tracks, see ease --list; may be repeated."
+        ),
     ] = None,
     through: Annotated[
         str | None,

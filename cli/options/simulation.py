@@ -17,6 +17,11 @@ from cli.errors import UsageError
 EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
 Integrator = StrEnum("Integrator", [(name, name) for name in INTEGRATORS])  # type: ignore[misc]
 VELOCITY_VERLET = Integrator("velocity-verlet")
+ABOUT_INTEGRATORS = "; ".join(
+    f"{name}: order {each.order}{f' ({each.drag_order} with drag or damping)' * (each.drag_order != each.order)}, "
+    f"{each.about}"
+    for name, each in INTEGRATORS.items()
+)
 DEFAULT_FPS = 60.0
 
 Clip = Annotated[
@@ -37,7 +42,9 @@ WarmUp = Annotated[
 ]
 Loop = Annotated[bool, typer.Option("--loop", help="Close the loop: end as it begins, and report the seam.")]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of random numbers.", min=0)]
-IntegratorOption = Annotated[Integrator, typer.Option("--integrator", help="Method of time integration.")]
+IntegratorOption = Annotated[
+    Integrator, typer.Option("--integrator", help=f"Method of time integration. {ABOUT_INTEGRATORS}.")
+]
 MaxError = Annotated[
     str | None,
     typer.Option("--max-error", metavar="LENGTH", help="Remove keys within this error, such as 0.5mm or 0.1%."),

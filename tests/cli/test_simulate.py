@@ -45,6 +45,13 @@ def test_the_default_step_and_the_line_of_a_kind_are_those_of_the_table(call: Ca
         assert f"such as 1/240. [default: {row.step}]" in words
 
 
+@pytest.mark.parametrize("kind", ["springs", "particles", "cloth"])
+def test_the_help_states_the_order_of_each_integrator_also_with_drag(kind: str, call: Call) -> None:
+    words = " ".join(call("simulate", kind, "--help").product().decode().split()).replace("- ", "-")
+    assert "verlet: order 2 (1 with drag or damping), keeps energy; velocity-verlet: order 2 (1 with drag" in words
+    assert "rk4: order 4, loses little energy" in words
+
+
 @pytest.mark.parametrize("kind", SIMULATIONS)
 def test_the_table_loads_the_function_of_a_kind(kind: str) -> None:
     parameters = list(inspect.signature(SIMULATIONS[kind].load()).parameters)

@@ -85,7 +85,7 @@ def command(
         simulation.Integrator | None,
         typer.Option(
             "--integrator",
-            help="Masses on springs by this method; without it oscillators are exact.",
+            help=f"Masses on springs by this method; without it oscillators are exact. {simulation.ABOUT_INTEGRATORS}.",
             show_default=False,
         ),
     ] = None,
