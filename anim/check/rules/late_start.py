@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,21 +14,34 @@ from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document
 from anim.model import Track
 
+UNITY = "unity"
+LATE_TRACKS = "late tracks"
+ADD_KEYS = "to add keys at 0 s: gltf-anim check FILE --fix --select GA105 --target unity"
 MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display shows them
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips."""
-    for clip in file.facts.clips:
-        if clip.start_s > MIN_LATE_START_S:
-            yield file.in_clip(clip.index, value=clip.start_s, time_s=0.0)
+    """Yield the clips; for Unity also those with only some late tracks."""
+    for report, clip in file.clips():
+        if report.start_s > MIN_LATE_START_S:
+            yield file.in_clip(report.index, value=report.start_s, time_s=0.0)
+        elif parameters.target == UNITY:
+            late = [float(track.times[0]) for track in clip.tracks if track.times[0] > MIN_LATE_START_S]
+            if late:
+                found = file.in_clip(report.index, len(late), max(late), problem=LATE_TRACKS, time_s=0.0)
+                yield replace(found, advice=ADD_KEYS)
 
 
 def problem(found: Sequence[Occurrence]) -> str:
-    """Return the range of the first keys."""
+    """Return the range of the first keys, or the number of late tracks."""
     starts = [each.value for each in found]
     least, most = (f"{each:.4f}".rstrip("0").rstrip(".") for each in (min(starts), max(starts)))
-    return f"first key at {least if least == most else f'{least} to {most}'} s: players hold the first pose until then"
+    span = least if least == most else f"{least} to {most}"
+    if all(each.problem == LATE_TRACKS for each in found):
+        count = sum(each.count for each in found)
+        tracks = "track has its" if count == 1 else "tracks have their"
+        return f"{count} {tracks} first key at {span} s: Unity shows another pose until then"
+    return f"first key at {span} s: players hold the first pose until then"
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

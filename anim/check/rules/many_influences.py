@@ -28,6 +28,7 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
     sets = math.ceil(parameters["influences"] / 4)
 
     def largest(skin: int, joints: Ints, weights: Floats) -> tuple[Ints, Floats]:
+        weights = _sums_by_joint(joints, weights)
         order = np.argsort(-weights, axis=1, kind="stable")[:, : 4 * sets]
         joints, weights = np.take_along_axis(joints, order, axis=1), np.take_along_axis(weights, order, axis=1)
         weights[:, int(parameters["influences"]) :] = 0
@@ -35,6 +36,20 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
         return np.where(weights > 0, joints, 0), weights / np.where(sums > 0, sums, 1)
 
     return edit_influences(file, {each.number for each in found}, largest)
+
+
+def _sums_by_joint(joints: Ints, weights: Floats) -> Floats:
+    """Weights (V, I) with the sum of each joint at its first influence, and 0 at others: sets may name a joint twice.
+
+    joints (1, 2, 1), weights (0.5, 0.3, 0.2) → 0.7, 0.3, 0
+    """
+    sums = weights.copy()
+    for later in range(1, joints.shape[1]):
+        for first in range(later):
+            same = (joints[:, first] == joints[:, later]) & (sums[:, first] > 0) & (sums[:, later] > 0)
+            sums[:, first] += np.where(same, sums[:, later], 0)
+            sums[same, later] = 0
+    return sums
 
 
 RULE = Rule(

@@ -52,12 +52,17 @@ def moving_nodes(skin: SkinMotion, clip: Clip, start: float, end: float, frame: 
     """Return the nodes with points that move in the first or in the last frame."""
     frames = (np.array([start, start + frame]), np.array([end - frame, end]))
     found = [_moved_between(sample_pose(skin.skeleton, clip, times), root) for times in frames]
-    return {node for node in np.concatenate(found).tolist() if _carries(skin, node)}
+    carrying = _carrying(skin)
+    return {node for node in np.concatenate(found).tolist() if carrying[node]}
 
 
-def _carries(skin: SkinMotion, node: int) -> bool:
-    below: Bools = skin.skeleton.descendants(node)[skin.points.nodes]
-    return bool((below[skin.points.joints] & (skin.points.factors[..., 3] > 0)).any())
+def _carrying(skin: SkinMotion) -> Bools:
+    """Mask (N,) of the nodes with points on them or on their descendants."""
+    points, carrying = skin.points, np.zeros(len(skin.skeleton), np.bool_)
+    carrying[points.nodes[points.joints[points.factors[..., 3] > 0]]] = True
+    for level in reversed(skin.skeleton.levels()[1:]):
+        carrying[skin.skeleton.parents[level[carrying[level]]]] = True
+    return carrying
 
 
 def _moved_between(both: Pose, root: int) -> Ints:

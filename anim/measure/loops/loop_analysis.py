@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -94,7 +95,7 @@ def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float
     duration = clip.end - clip.start
     if duration <= 0:
         return []
-    fps = min(_fps(clip), (MAX_FRAMES - 1) / duration)
+    fps = min(loop_frame_rate(clip), (MAX_FRAMES - 1) / duration)
     times = clip.start + np.arange(int(duration * fps + 1e-6) + 1) / fps
     points = skin.places(clip, times, root)
     speeds = np.gradient(points, axis=1) if points.shape[1] > 1 else np.zeros_like(points)
@@ -117,24 +118,23 @@ def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float
 
 
 def _judge(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> Loop:
-    fps = _fps(clip)
-    frame_step = min(1 / fps, (end - start) / 2) if end > start else 0.0
+    fps = loop_frame_rate(clip)
+    frame_step = frame_duration(fps, start, end)
     if not len(skin.points) or frame_step == 0:
         kind = LoopKind.NOT_A_LOOP if end > start else LoopKind.SINGLE_POSE
         return Loop(kind, start, end, 0.0, 0.0, "", 0.0, Steps(), 0.0, fps)
     (seam,) = measure_seams(skin, [LoopRange(clip, start, end, frame_step, root)])
     inside = _steps(skin, clip, start, end, frame_step, root)
-    gaps = joint_gaps(skin, clip, start, end, root)
     size = seam.gap
-    joints = tuple(each for each in gaps if each.gap > NOISE_PER_SIZE * skin.size)
+    joints = open_joints(skin, clip, start, end, root)
     if size <= min(
         max(INVISIBLE_GAP_PER_FRAME * inside.typical, NOISE_PER_SIZE * skin.size),
         VISIBLE_GAP_PER_SIZE * skin.size,
     ):
         kind, joints = LoopKind.CLOSED, ()
     else:
-        closing = moving_nodes(skin, clip, start, end, frame_step, root) - {each.node for each in joints}
-        kind = _open_kind(seam, size, inside.largest, few=len(joints) < len(closing))
+        few = are_few(joints, moving_nodes(skin, clip, start, end, frame_step, root))
+        kind = _open_kind(seam, size, inside.largest, few=few)
     worst = joints[0].joint if joints else seam.fastest
     travel = _travel(skin, clip, start, end, root)
     return Loop(kind, start, end, size, seam.speed, worst, seam.frame, inside, travel, fps, joints)
@@ -144,9 +144,23 @@ def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind
     """few: whether more joints close while they move than are open; then no frame is missing."""
     if few and size <= inside:
         return LoopKind.CLOSED_EXCEPT
-    if not few and size <= MAX_MISSING_FRAMES * seam.frame and seam.going_on <= seam.frame:
-        return LoopKind.OPEN_BY_ONE_FRAME
-    return LoopKind.NOT_A_LOOP
+    return LoopKind.OPEN_BY_ONE_FRAME if not few and is_one_frame(seam) else LoopKind.NOT_A_LOOP
+
+
+def is_one_frame(seam: Seam) -> bool:
+    """Return whether a loop gap is about the next frame's motion."""
+    return seam.gap <= MAX_MISSING_FRAMES * seam.frame and seam.going_on <= seam.frame
+
+
+def open_joints(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> tuple[JointGap, ...]:
+    """Return the joints with a gap above rounding, the largest first."""
+    gaps = joint_gaps(skin, clip, start, end, root)
+    return tuple(each for each in gaps if each.gap > NOISE_PER_SIZE * skin.size)
+
+
+def are_few(joints: Sequence[JointGap], moving: set[int]) -> bool:
+    """Return whether fewer joints are open than close while they move."""
+    return len(joints) < len(moving - {each.node for each in joints})
 
 
 def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, root: int) -> Steps:
@@ -166,9 +180,15 @@ def _some(numbers: Floats) -> Floats:
     return np.asarray(numbers[np.linspace(0, len(numbers) - 1, count).round().astype(int)])
 
 
-def _fps(clip: Clip) -> float:
+def loop_frame_rate(clip: Clip) -> float:
+    """Return the frame rate of an analysis: of regular keys their own, else DEFAULT_FPS."""
     found = frame_rate.estimate_frame_rate(clip.key_times)
     return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
+
+
+def frame_duration(fps: float, start: float, end: float) -> float:
+    """Return the duration of a frame in s, at most half of a time range; 0 of an empty one."""
+    return min(1 / fps, (end - start) / 2) if end > start else 0.0
 
 
 def _travel(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> float:

@@ -10,12 +10,13 @@ import pytest
 from anim.arrays import Floats
 from anim.check.checked_file import CheckedFile
 from anim.check.fixing import fix_all
+from anim.check.selection import RuleSelection
 from anim.gltf.document import Document
 from anim.gltf.writing.append import VERTICES, append_accessors
 from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip
 from anim.sampling.pose import PosedSkeleton, sample_pose
-from tests.anim.check.cases import WRONG, checked, edited, selection
+from tests.anim.check.cases import WRONG, checked, edited, selection, with_influences
 
 
 def vertices(file: CheckedFile, clip: Clip, time: float) -> list[Floats]:
@@ -75,8 +76,19 @@ def test_unused_joints_are_removed_from_two_skins_that_use_one_accessor() -> Non
 def test_the_error_of_fewer_influences_is_measured_with_the_new_weights() -> None:
     broken = WRONG["GA201"][0]
     file = broken if isinstance(broken, CheckedFile) else checked(broken)
-    (applied,) = (result := fix_all(file, selection("GA201"), unsafe=True)).applied
+    one = RuleSelection(select=("GA201",), parameters={"GA201.influences": "1"})
+    (applied,) = (result := fix_all(file, one, unsafe=True)).applied
     error = largest(file, checked(result.document))
     assert error > 1e-3
     assert applied.error_m >= error * (1 - 1e-9)
     assert applied.error_m == pytest.approx(error, rel=0.1)
+
+
+def test_a_joint_in_two_sets_stays_in_one() -> None:
+    """glTF forbids two influences of one joint on a vertex."""
+    file = checked(with_influences([[0, 1, 0, 1], [1, 0, 0, 0]], [[0.3, 0.2, 0.2, 0.2], [0.1, 0.0, 0.0, 0.0]]))
+    result = fix_all(file, selection("GA201"), unsafe=True)
+    (instance,) = checked(result.document).scene.instances
+    assert instance.mesh.weights[0] == pytest.approx([0.5, 0.5, 0, 0])
+    assert instance.mesh.joints[0].tolist() == [0, 1, 0, 0]
+    assert result.applied[0].error_m < 1e-6

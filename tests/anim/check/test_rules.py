@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,15 +15,20 @@ from anim.check.fixing import fix_all
 from anim.check.registry import RULES
 from anim.check.rules import loop_seam, residual_root_motion
 from anim.check.selection import RuleSelection
+from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from tests.anim.check.cases import (
+    ARM_JOINTS,
+    SMOOTH,
     SOUND,
     WRONG,
     checked,
     edited,
     found,
+    joint,
     put,
+    same_names,
     selection,
     steps,
     with_tracks,
@@ -126,6 +133,58 @@ def test_a_channel_that_lost_its_pointer_uses_no_extension() -> None:
     lost = edited(put("animations/0/channels/0/target", {"path": "pointer"}))
     assert found(lost, "GA501") == []
     assert found(lost, "GA015")
+
+
+def test_a_doubled_end_frame_is_removed() -> None:
+    """Two frames at the end have the first pose: a loop pauses for one."""
+    times = np.arange(14) / 12
+    doubled = with_tracks(track("translation", times, np.vstack((SMOOTH, SMOOTH[-1:])), node=1))
+    (finding,) = found(doubled, "GA108")
+    assert finding.advice == "to remove the frame: gltf-anim trim IN OUT --to 1 --clip '#0'"
+    result = fix_all(checked(doubled), selection("GA108"), unsafe=True)
+    assert reader.clips(result.document)[0].end == 1.0
+    assert found(result.document, "GA108") == []
+
+
+def with_twin(json: dict[str, Any]) -> None:
+    """Add a copy of the first joint, with a child of the name of the second one, beside it."""
+    first, second = (json["nodes"][each]["name"] for each in ARM_JOINTS[:2])
+    count = len(json["nodes"])
+    json["nodes"] += [{"name": first, "children": [count + 1]}, {"name": second}]
+    json["scenes"][0]["nodes"].append(count)
+
+
+def found_in_unity(document: Document, code: str) -> list[Finding]:
+    return [*find_all(checked(document), RuleSelection(select=(code,), target="unity"))]
+
+
+def test_unity_needs_keys_at_0_in_every_track() -> None:
+    """Other players show the first value of a track until its first key; Unity poses of another clip."""
+    late = joint("translation", [[0, 1, 0], [0, 2, 0]], [0.5, 1])
+    document = with_tracks(track("translation", [0, 1], [[0, 0, 0], [0, 1, 0]], node=ARM_JOINTS[0]), late)
+    assert found(document, "GA105") == []
+    (finding,) = found_in_unity(document, "GA105")
+    assert finding.problem == "1 track has its first key at 0.5 s: Unity shows another pose until then"
+    fixed = fix_all(checked(document), RuleSelection(select=("GA105",), target="unity"), unsafe=False)
+    assert [each.error_m for each in fixed.applied] == [0.0]
+    assert found_in_unity(fixed.document, "GA105") == []
+
+
+def test_unity_finds_nodes_by_their_path() -> None:
+    moves = [[0, 0, 0], [0, 1, 0]]
+    chain = with_tracks(*(track("translation", [0, 1], moves, node=node) for node in ARM_JOINTS[:2]))
+    same_names(chain.json)
+    chain.json["nodes"][-1]["name"] = "mesh"  # the other two are on different paths
+    assert found(chain, "GA003")
+    assert found_in_unity(chain, "GA003") == []
+    twins = edited(with_twin)
+    assert found(twins, "GA003") == []
+    (finding,) = found_in_unity(twins, "GA003")
+    assert finding.problem.startswith("2 nodes have the path '")
+    fixed = fix_all(checked(twins), RuleSelection(select=("GA003",), target="unity"), unsafe=True)
+    assert found_in_unity(fixed.document, "GA003") == []
+    names = [[node.get("name") for node in each.json["nodes"]] for each in (twins, fixed.document)]
+    assert sum(old != new for old, new in zip(*names, strict=True)) == 1
 
 
 def test_eight_active_targets_are_promised() -> None:
