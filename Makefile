@@ -4,22 +4,23 @@ BPY_PYTHON ?= python3.11
 BIN := .venv/bin
 OUT := demo-out
 FUZZ_SECONDS ?= 14400
+PAGE := anim/show/page/bundle/page.js
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test slow fuzz docs blender format clean
+.PHONY: demo test slow fuzz docs page blender format clean
 
-demo: $(BIN)/.installed
+demo: $(BIN)/.installed $(PAGE)
 	@$(BIN)/python -m fixtures $(OUT)/fixtures 2>/dev/null
 	@sh fixtures/demo.sh $(OUT)/fixtures/biped.glb $(OUT)
 
-test: $(BIN)/.installed
+test: $(BIN)/.installed $(PAGE)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
 # What takes minutes: real files under three bounds, judged by three.js. CI runs it too.
-slow: $(BIN)/.installed
+slow: $(BIN)/.installed $(PAGE)
 	$(BIN)/python -m pytest -n auto -m slow
 
 # Mutations of fixtures for hours; inputs with faults go to fuzz-out (`python -m tests.fuzz --help`).
@@ -30,6 +31,12 @@ fuzz: $(BIN)/.installed
 docs: $(BIN)/.installed
 	$(BIN)/python -m docs.generate
 	$(BIN)/python -m docs.pages
+
+# The script of `view`'s pages, by npm; made with the installation, and again where its sources are newer.
+page: $(PAGE)
+
+$(PAGE): $(wildcard anim/show/page/web/*.js*) | $(BIN)/.installed
+	-@$(BIN)/python -m anim.show.page.build --if-older
 
 # Blender's module, which plays what we write in some slow tests: 370 MB, for one version of Python, so in its own venv.
 blender: .venv-blender/.installed

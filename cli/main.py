@@ -146,6 +146,15 @@ COMMANDS = {
             "gltf-anim plot walk.glb --terminal --limit 2",
         ),
     ),
+    "view": CommandInfo(
+        "Show files as a page that plays them, or compares two.",
+        (
+            "gltf-anim view walk.glb -o walk.html",
+            "gltf-anim view walk.glb walk30.glb -o compared.html --show heat,bones",
+            "gltf-anim view hero.glb -o hip.html --clip 'Run*' --node Hips --at 0.25 --show curves",
+            "gltf-anim view walk.bvh -o motion.html",
+        ),
+    ),
     "collapse": CommandInfo(
         "Find where skin collapses, and compare skinning methods.",
         (

@@ -14,7 +14,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def test_the_project_names_two_packages() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert project["tool"]["hatch"]["build"]["targets"] == {"wheel": {"packages": ["anim", "cli"]}}
+    build = project["tool"]["hatch"]["build"]
+    assert build["targets"] == {"wheel": {"packages": ["anim", "cli"]}}
+    assert build["artifacts"] == ["anim/show/page/bundle/*"]
     assert project["project"]["scripts"] == {"gltf-anim": "cli.entry_point:main"}
 
 

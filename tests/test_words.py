@@ -25,6 +25,7 @@ ADVICE = (  # modules that compose command lines, the advice of findings
     "anim/check/",
     "anim/gltf/reading/reader.py",
     "anim/measure/loops/recommendations.py",
+    "anim/show/page/build/",  # options of npm and esbuild
     "anim/simulation/report.py",
     "anim/skinning/analysis/recommendations.py",
 )

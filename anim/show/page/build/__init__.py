@@ -1,0 +1,1 @@
+"""Build of the page's script: `python -m anim.show.page.build`."""

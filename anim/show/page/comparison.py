@@ -1,0 +1,94 @@
+"""Errors between two files for a page: over time, and the largest one of each clip as a link."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from anim.arrays import Floats
+from anim.gltf.reading.reader import clip_name
+from anim.measure.compare.name_matching import match_by_name_then_order
+from anim.measure.error.error_curve import error_curve
+from anim.measure.error.metric import FPS, ErrorMetric, MotionError
+from anim.model import Clip
+from anim.show.page.page import ClipError, PageContent, PageLink, PagePanel, PageRow
+from anim.units import format_number
+
+MAX_POINTS = 400  # of an error curve on the page
+MAX_CURVES = 40  # clips with an error curve, the worst ones
+MIN_ERROR_PER_DIAGONAL = 1e-7  # smaller errors come from rounding in float32
+UNITS = ((1.0, "m", 1.0), (1e-2, "cm", 1e2), (1e-4, "mm", 1e3), (1e-7, "µm", 1e6), (0.0, "nm", 1e9))
+
+
+@dataclass(frozen=True, slots=True)
+class ClipPair:
+    """A clip of each file by index, and the largest distance between both."""
+
+    old: int
+    new: int
+    error: MotionError
+
+
+def compare_clips(ruler: ErrorMetric, old: Sequence[Clip], new: Sequence[Clip]) -> list[ClipPair]:
+    """Return the largest distance between each old clip and its counterpart, matched by name, then by order."""
+    partners = match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
+    matched = [(i, int(partner)) for i, partner in enumerate(partners.tolist()) if partner >= 0]
+    return [ClipPair(i, j, ruler.error(old[i], new[j])) for i, j in matched]
+
+
+def compare_content(
+    ruler: ErrorMetric,
+    old: Sequence[Clip],
+    new: Sequence[Clip],
+    pairs: Iterable[ClipPair],
+    *,
+    subtitle: str = "",
+    player: str = "spec",
+    fps: float = FPS,
+) -> PageContent:
+    """Return error curves, and a panel with the position and time of each clip's largest error, worst first.
+
+    player: a name in PLAYERS. fps: samples per second in addition to all keys.
+    """
+    found = sorted(pairs, key=lambda pair: -pair.error.max_error)
+    least = MIN_ERROR_PER_DIAGONAL * ruler.diagonal
+    errors = {}
+    for i, pair in enumerate(found):
+        if pair.error.max_error <= least:
+            errors[pair.old] = ClipError(0.0)
+        elif i < MAX_CURVES:
+            curve = error_curve(ruler, old[pair.old], new[pair.new], player=player, fps=fps)
+            errors[pair.old] = ClipError(pair.error.max_error, *_reduce(curve.times, curve.error))
+        else:
+            errors[pair.old] = ClipError(pair.error.max_error)
+    rows = tuple(_row(ruler, old, pair) for pair in found if pair.error.max_error > least)
+    panel = PagePanel("Largest errors", rows or (PageRow(("no vertex moves differently",)),), str(len(rows) or ""), 2)
+    return PageContent(subtitle, (panel,), errors, {pair.old: pair.new for pair in found})
+
+
+def _row(ruler: ErrorMetric, old: Sequence[Clip], pair: ClipPair) -> PageRow:
+    error = pair.error
+    nodes = ruler.scene.skeleton.names
+    node = nodes.index(error.joint) if error.joint in nodes else None
+    cells = (
+        f"{clip_name(old[pair.old].name, pair.old)} · {error.joint}",
+        f"{error.time:.3f} s",
+        _length(error.max_error),
+    )
+    return PageRow(cells, PageLink(pair.old, node, error.time))
+
+
+def _reduce(times: Floats, errors: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """At most MAX_POINTS points of a curve: of each stretch the largest error, at its own time."""
+    count = len(times)
+    edges = np.unique(np.linspace(0, count, min(count, MAX_POINTS) + 1).astype(np.int64))
+    kept = [int(first + np.argmax(errors[first:last])) for first, last in pairwise(edges.tolist())]
+    return tuple(round(float(times[i]), 6) for i in kept), tuple(float(f"{errors[i]:.7g}") for i in kept)
+
+
+def _length(meters: float) -> str:
+    unit, factor = next((unit, factor) for least, unit, factor in UNITS if meters >= least)
+    return f"{format_number(meters * factor, 3)} {unit}"

@@ -1,0 +1,172 @@
+// Curves of the chosen node: as three.js evaluates them, with keys and the tangents of cubic splines.
+
+import { Quaternion } from "three";
+import { begin, ink } from "./canvas.js";
+import { INSET } from "./timeline.js";
+
+const SAMPLES = 320;
+const MAX_DOTS = 160; // keys per track drawn as dots
+const MAX_WEIGHTS = 12; // morph targets drawn
+const TITLE = 20; // px above a graph
+const COLORS = ["--x", "--y", "--z", "--w"];
+const AXES = ["x", "y", "z", "w"];
+const UNITS = { translation: "m", rotation: "", scale: "×", weights: "" };
+
+export class Curves {
+  constructor(panel, seek) {
+    this.canvas = panel.querySelector("canvas");
+    this.hover = null;
+    this.seek = seek;
+    const timeAt = (event) => {
+      const width = this.canvas.clientWidth - 2 * INSET;
+      return Math.max(0, Math.min(1, (event.offsetX - INSET) / width)) * this.duration;
+    };
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons) seek(timeAt(event));
+    });
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      seek(timeAt(event));
+    });
+  }
+
+  /** sides: tracks of the chosen node per file, [{path, track}], and its rest rotation. */
+  draw({ sides, duration, time, unit, message }) {
+    this.duration = Math.max(duration, 1e-6);
+    const { context, width, height } = begin(this.canvas);
+    const paths = [...new Set(sides.flatMap((side) => side.tracks.map((each) => each.path)))];
+    if (!paths.length) {
+      context.fillStyle = ink("--dim");
+      context.font = "13px system-ui, sans-serif";
+      context.fillText(message, INSET, height / 2);
+      return;
+    }
+    const part = height / paths.length;
+    for (const [i, path] of paths.entries()) {
+      const graphs = sides.flatMap((side, which) =>
+        side.tracks.filter((each) => each.path === path).map((each) => ({ which, ...graph(each, side.rest, unit) })),
+      );
+      this.#drawGraph(context, { graphs, path, time, top: i * part, height: part, width, isFirst: i === 0 });
+    }
+    context.fillStyle = ink("--accent");
+    context.fillRect(INSET + ((width - 2 * INSET) * time) / this.duration - 0.75, 0, 1.5, height);
+  }
+
+  #drawGraph(context, { graphs, path, time, top, height, width, isFirst }) {
+    const samples = Array.from({ length: SAMPLES + 1 }, (_, i) => (this.duration * i) / SAMPLES);
+    const lines = graphs.map((each) => samples.map(each.at));
+    const all = lines.flat(2);
+    let [low, high] = [Math.min(...all), Math.max(...all)];
+    const least = path === "rotation" ? 1 : 1e-3;
+    if (high - low < least) [low, high] = [low - least, high + least];
+    const x = (at) => INSET + ((width - 2 * INSET) * at) / this.duration;
+    const y = (value) => top + height - 6 - ((height - TITLE - 10) * (value - low)) / (high - low);
+    if (!isFirst) {
+      context.fillStyle = ink("--line");
+      context.fillRect(0, Math.round(top), width, 1);
+    }
+    if (low < 0 && high > 0) {
+      context.fillStyle = ink("--line");
+      context.fillRect(INSET, Math.round(y(0)), width - 2 * INSET, 1);
+    }
+    for (const [g, each] of graphs.entries()) {
+      context.setLineDash(each.which ? [4, 3] : []);
+      context.globalAlpha = each.which ? 0.75 : 1;
+      for (let c = 0; c < each.size; c++) {
+        context.strokeStyle = ink(COLORS[c % 4]);
+        context.lineWidth = 1.5;
+        context.beginPath();
+        samples.forEach((at, i) => context.lineTo(x(at), y(lines[g][i][c])));
+        context.stroke();
+      }
+      context.setLineDash([]);
+      drawKeys(context, each, x, y);
+    }
+    context.globalAlpha = 1;
+    this.#drawTitle(context, graphs, path, time, top);
+  }
+
+  #drawTitle(context, graphs, path, time, top) {
+    context.font = "600 11px system-ui, sans-serif";
+    context.fillStyle = ink("--text");
+    let left = INSET;
+    const write = (text) => {
+      context.fillText(text, left, top + 15);
+      left += context.measureText(text).width + 10;
+    };
+    write(path);
+    context.font = "11px system-ui, sans-serif";
+    const [first] = graphs;
+    const values = first.at(time);
+    for (let c = 0; c < first.size; c++) {
+      context.fillStyle = ink(COLORS[c % 4]);
+      const name = path === "weights" ? `${c}` : AXES[c];
+      write(`${name} ${Number(values[c].toPrecision(4))}${first.unit}`);
+    }
+    context.fillStyle = ink("--dim");
+    write(`${first.times.length} keys`);
+  }
+}
+
+function drawKeys(context, { times, size, at, tangents, which }, x, y) {
+  if (times.length > MAX_DOTS || which) return;
+  for (const [k, time] of times.entries()) {
+    const values = at(time);
+    for (let c = 0; c < size; c++) {
+      context.fillStyle = ink(COLORS[c % 4]);
+      context.strokeStyle = context.fillStyle;
+      if (tangents) drawTangent(context, tangents, times, k, c, values[c], x, y);
+      context.fillRect(x(time) - 2, y(values[c]) - 2, 4, 4);
+    }
+  }
+}
+
+/** Handles of a cubic key, a third of the segment long, as in editors. */
+function drawTangent(context, tangents, times, k, c, value, x, y) {
+  context.lineWidth = 1;
+  context.globalAlpha = 0.6;
+  for (const [direction, slopes] of [[-1, tangents.in], [1, tangents.out]]) {
+    const other = times[k + direction];
+    if (other === undefined) continue;
+    const reach = (other - times[k]) / 3;
+    context.beginPath();
+    context.moveTo(x(times[k]), y(value));
+    context.lineTo(x(times[k] + reach), y(value + slopes(k, c) * reach));
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+}
+
+/** Values of a track over time, as numbers or as degrees from the rest rotation. */
+function graph({ path, track }, rest, unit) {
+  const width = track.getValueSize() / (isCubic(track) ? 3 : 1);
+  const interpolant = track.createInterpolant(new Float32Array(width));
+  const times = [...track.times];
+  const raw = (time) => [...interpolant.evaluate(Math.max(times[0], Math.min(time, times.at(-1))))];
+  if (path === "rotation" && unit === "degrees") {
+    return { times, size: 3, unit: "°", at: (time) => rotationVector(raw(time), rest) };
+  }
+  const size = path === "weights" ? Math.min(width, MAX_WEIGHTS) : width;
+  const tangents = isCubic(track) ? tangentsOf(track, width) : null;
+  const suffix = UNITS[path] && path === "translation" ? ` ${UNITS[path]}` : "";
+  return { times, size, unit: suffix, at: (time) => raw(time).slice(0, size), tangents };
+}
+
+function isCubic(track) {
+  return Boolean(track.createInterpolant.isInterpolantFactoryMethodGLTFCubicSpline);
+}
+
+/** Slopes per second; glTF stores in-tangent, value and out-tangent of each key. */
+function tangentsOf(track, width) {
+  const slope = (part) => (k, c) => track.values[3 * width * k + part * width + c];
+  return { in: slope(0), out: slope(2) };
+}
+
+/** Axis times angle, in degrees, of the rotation from rest. */
+function rotationVector(values, rest) {
+  const turn = new Quaternion(...values).normalize().premultiply(rest.clone().conjugate());
+  if (turn.w < 0) turn.set(-turn.x, -turn.y, -turn.z, -turn.w);
+  const sine = Math.hypot(turn.x, turn.y, turn.z);
+  const factor = sine < 1e-9 ? 2 : (2 * Math.atan2(sine, turn.w)) / sine;
+  return [turn.x, turn.y, turn.z].map((part) => (part * factor * 180) / Math.PI);
+}

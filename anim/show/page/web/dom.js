@@ -1,0 +1,18 @@
+// Elements. Text is set as text only: names in a file may contain markup.
+
+export const $ = (selector) => document.querySelector(selector);
+
+/** make("button", {class: "row", onclick}, "text", child…) */
+export function make(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (value !== null && value !== undefined) element.setAttribute(name, value);
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+export function setPressed(element, isPressed) {
+  element?.setAttribute("aria-pressed", isPressed ? "true" : "false");
+}

@@ -1,0 +1,32 @@
+// Numbers with units.
+
+const LENGTHS = [[1, "m", 1], [1e-2, "cm", 1e2], [1e-4, "mm", 1e3], [1e-7, "µm", 1e6], [0, "nm", 1e9]];
+
+/** "0.41 mm", "12 cm", "1.71 m". */
+export function formatLength(metres) {
+  if (!metres) return "0 mm";
+  const [, unit, factor] = LENGTHS.find(([least]) => metres >= least);
+  return `${Number((metres * factor).toPrecision(3))} ${unit}`;
+}
+
+export function formatTime(seconds) {
+  return `${seconds.toFixed(seconds < 100 ? 2 : 1)} s`;
+}
+
+export function formatBytes(count) {
+  if (count < 1000) return `${count} B`;
+  const unit = count < 1e6 ? "kB" : "MB";
+  return `${Number((count / (count < 1e6 ? 1e3 : 1e6)).toPrecision(3))} ${unit}`;
+}
+
+/** The largest of 1, 2 and 5 times a power of ten that is at most `value`. */
+export function roundDown(value) {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return [5, 2, 1].find((digit) => digit * power <= value * 1.0001) * power;
+}
+
+/** The smallest of 1, 2 and 5 times a power of ten that is at least `value`. */
+export function roundUp(value) {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return [1, 2, 5, 10].find((digit) => digit * power >= value * 0.9999) * power;
+}

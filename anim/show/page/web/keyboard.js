@@ -1,0 +1,31 @@
+// Keys, and the sheet that lists them.
+
+import { $, make } from "./dom.js";
+
+/** bindings: [{keys: [" "], label: "play or pause", run(event), isShown}]; keys are those of KeyboardEvent.key. */
+export function listenToKeys(bindings) {
+  const byKey = new Map(bindings.flatMap((each) => each.keys.map((key) => [key, each])));
+  addEventListener("keydown", (event) => {
+    const tag = event.target.tagName;
+    if (event.ctrlKey || event.metaKey || event.altKey || $("#keys").open) return;
+    if (tag === "SELECT" || (tag === "INPUT" && event.target.type === "search")) return;
+    if (event.key === " " && tag === "BUTTON" && event.target.id !== "play") return;
+    if (event.key === " " && tag === "SUMMARY") return;
+    const binding = byKey.get(event.key.length === 1 ? event.key.toLowerCase() : event.key);
+    if (!binding || binding.isShown === false) return;
+    event.preventDefault();
+    binding.run(event);
+  });
+  const rows = bindings
+    .filter((each) => each.isShown !== false)
+    .map((each) =>
+      make("div", {}, make("span", {}, ...each.keys.map((key) => make("kbd", {}, LABELS[key] ?? key.toUpperCase()))), each.label),
+    );
+  $("#keys .list").append(...rows);
+}
+
+const LABELS = { " ": "space", ArrowLeft: "←", ArrowRight: "→", Home: "Home", End: "End" };
+
+export function openSheet() {
+  $("#keys").showModal();
+}

@@ -1,0 +1,111 @@
+// One file: its scene, its pose at a time, its nodes and their tracks.
+
+import { AnimationMixer, DirectionalLight, Group, HemisphereLight, Scene } from "three";
+
+export class Side {
+  constructor(gltf, about) {
+    this.gltf = gltf;
+    this.name = about.name;
+    this.clips = gltf.animations;
+    this.clipNames = (gltf.parser.json.animations ?? []).map((clip, i) => clip.name || `#${i}`);
+    this.root = gltf.scene;
+    this.scene = new Scene();
+    this.overlay = new Group(); // skeleton, onion skins: drawn above the model
+    this.scene.add(this.root, this.overlay, ...lights());
+    this.meshes = [];
+    this.root.traverse((object) => object.isMesh && this.meshes.push(object));
+    for (const mesh of this.meshes) prepareMesh(mesh);
+    this.nodes = nodesOf(gltf);
+    this.mixer = new AnimationMixer(this.root);
+    this.action = null;
+  }
+
+  get clip() {
+    return this.action ? this.action.getClip() : null;
+  }
+
+  choose(clip) {
+    this.mixer.stopAllAction();
+    this.mixer.uncacheRoot(this.root);
+    this.action = clip ? this.mixer.clipAction(clip).play() : null;
+    this.tracks = clip ? tracksByNode(clip, this.nodes) : new Map();
+  }
+
+  /** Pose the model; time is set, never counted by the mixer, so that scrubbing repeats exactly. */
+  pose(time) {
+    if (this.action) {
+      this.action.time = Math.min(time, this.clip.duration);
+      this.mixer.update(0);
+    }
+    this.root.updateMatrixWorld(true);
+    for (const mesh of this.meshes) mesh.skeleton?.update();
+  }
+}
+
+function lights() {
+  const sun = new DirectionalLight(0xffffff, 2);
+  const back = new DirectionalLight(0xbfd4ff, 0.7);
+  sun.position.set(1, 2, 1.5);
+  back.position.set(-1.5, 0.6, -1.5);
+  return [new HemisphereLight(0xffffff, 0x8a8478, 1.9), sun, back];
+}
+
+function prepareMesh(mesh) {
+  mesh.frustumCulled = false; // three.js culls by the bounds at rest
+  mesh.userData.ownMaterial = mesh.material;
+  for (const material of [mesh.material].flat()) {
+    // Metal is black without surroundings, and those cost seconds on software GL
+    if ("metalness" in material) material.metalness = 0;
+    if (material.transmission > 0) Object.assign(material, { transmission: 0, transparent: true, opacity: 0.4 });
+  }
+}
+
+/** Nodes by index of the file: object, name, parent and depth; those outside the scene are left out. */
+function nodesOf(gltf) {
+  const json = gltf.parser.json.nodes ?? [];
+  const nodes = new Map();
+  const visit = (object, parent, depth) => {
+    const index = gltf.parser.associations.get(object)?.nodes;
+    const isNode = index !== undefined && !nodes.has(index);
+    if (isNode) nodes.set(index, { index, object, name: json[index].name || `node ${index}`, parent, depth });
+    for (const child of object.children) visit(child, isNode ? index : parent, isNode ? depth + 1 : depth);
+  };
+  visit(gltf.scene, null, 0);
+  const joints = new Set((gltf.parser.json.skins ?? []).flatMap((skin) => skin.joints));
+  for (const node of nodes.values()) {
+    node.isJoint = joints.has(node.index);
+    node.rest = { quaternion: node.object.quaternion.clone() };
+  }
+  return nodes;
+}
+
+/** Tracks of a clip by node index. three.js names tracks by the object: of a node, or of one of its meshes. */
+function tracksByNode(clip, nodes) {
+  const owner = new Map();
+  for (const node of nodes.values()) {
+    const add = (object) => {
+      if (object !== node.object && [...nodes.values()].some((other) => other.object === object)) return;
+      if (!owner.has(object.name)) owner.set(object.name, node.index);
+      owner.set(object.uuid, node.index);
+    };
+    add(node.object);
+    for (const child of node.object.children) if (child.isMesh) add(child);
+  }
+  const found = new Map();
+  for (const track of clip.tracks) {
+    const dot = track.name.lastIndexOf(".");
+    const index = owner.get(track.name.slice(0, dot));
+    if (index === undefined) continue;
+    const path = PATHS[track.name.slice(dot + 1)];
+    const list = found.get(index) ?? found.set(index, []).get(index);
+    if (!list.some((each) => each.path === path)) list.push({ path, track });
+  }
+  return found;
+}
+
+const PATHS = {
+  position: "translation",
+  quaternion: "rotation",
+  scale: "scale",
+  morphTargetInfluences: "weights",
+};

@@ -1,0 +1,151 @@
+// The picture: renderer, one camera for both files, floor, and the frame that fits what moves.
+
+import { Box3, Mesh, PerspectiveCamera, PlaneGeometry, ShaderMaterial, Vector3, WebGLRenderer } from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { formatLength, roundDown } from "./format.js";
+import { state } from "./state.js";
+
+const FIT_TIMES = 5; // of the clip
+const MAX_FIT_VERTICES = 1500; // per mesh and time
+const MAX_PIXEL_RATIO = 2;
+const FLOOR_RADII = 6; // radius of the floor, in radii of the model
+const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from the front, a little from the left and above
+
+export class Stage {
+  constructor(canvas, sides) {
+    this.sides = sides;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
+    this.renderer.setScissorTest(true);
+    this.camera = new PerspectiveCamera(32);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.controls.dampingFactor = 0.12;
+    this.floors = sides.map((side) => {
+      const mesh = floor();
+      side.scene.add(mesh);
+      return mesh;
+    });
+    this.radius = 1;
+    this.cell = 1;
+  }
+
+  get shown() {
+    if (state.side === "both" || this.sides.length < 2) return this.sides;
+    return [this.sides[state.side === "a" ? 0 : 1]];
+  }
+
+  /** Aim the camera at everything that moves, at some times of the clip, in the narrower direction of a view. */
+  fit(duration) {
+    const box = new Box3();
+    for (const side of this.sides) {
+      for (let i = 0; i < FIT_TIMES; i++) {
+        side.pose((duration * i) / (FIT_TIMES - 1));
+        for (const mesh of side.meshes) expand(box, mesh);
+        if (!side.meshes.length) {
+          for (const node of side.nodes.values()) box.expandByPoint(node.object.getWorldPosition(new Vector3()));
+        }
+      }
+    }
+    if (box.isEmpty()) box.set(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+    const center = box.getCenter(new Vector3());
+    this.radius = box.getSize(new Vector3()).length() / 2 || 1;
+    const { clientWidth, clientHeight } = this.renderer.domElement.parentNode;
+    const aspect = clientWidth / clientHeight / this.shown.length;
+    const halfAngle = Math.atan(Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, aspect));
+    const distance = (this.radius * 1.04) / Math.sin(halfAngle);
+    this.camera.near = distance / 100;
+    this.camera.far = distance * 50;
+    this.camera.position.copy(DIRECTION).setLength(distance).add(center);
+    this.controls.target.copy(center);
+    this.controls.maxDistance = distance * 10;
+    this.controls.update();
+    this.cell = roundDown(this.radius / 2);
+    for (const mesh of this.floors) {
+      mesh.scale.setScalar(this.radius * FLOOR_RADII);
+      mesh.position.set(center.x, box.min.y, center.z);
+      mesh.material.uniforms.cell.value = this.cell;
+    }
+  }
+
+  get floorLabel() {
+    return `grid ${formatLength(this.cell)}`;
+  }
+
+  /** Draw the shown files side by side; `prepare(side)` puts each in its pose first. */
+  draw(prepare) {
+    const { renderer, camera, shown } = this;
+    const { clientWidth: width, clientHeight: height } = renderer.domElement.parentNode;
+    const ratio = renderer.getPixelRatio();
+    const canvas = renderer.domElement;
+    if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio)) {
+      renderer.setSize(width, height, false);
+    }
+    const part = Math.floor(width / shown.length);
+    camera.aspect = part / height;
+    camera.updateProjectionMatrix();
+    const ink = getComputedStyle(document.documentElement).getPropertyValue("--floor").trim();
+    for (const [i, side] of shown.entries()) {
+      prepare(side);
+      this.floors[this.sides.indexOf(side)].material.uniforms.ink.value = Number(ink);
+      renderer.setViewport(i * part, 0, part, height);
+      renderer.setScissor(i * part, 0, part, height);
+      renderer.render(side.scene, camera);
+    }
+  }
+
+  /** Position of a point of the scene on the screen: CSS pixels in the view that shows `side`; null if behind. */
+  project(point, side) {
+    const index = this.shown.indexOf(side);
+    if (index < 0) return null;
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentNode;
+    const part = width / this.shown.length;
+    const spot = point.clone().project(this.camera);
+    if (spot.z > 1) return null;
+    return { x: index * part + ((spot.x + 1) / 2) * part, y: ((1 - spot.y) / 2) * height };
+  }
+}
+
+function expand(box, mesh) {
+  const count = mesh.geometry.attributes.position.count;
+  const step = Math.max(1, Math.floor(count / MAX_FIT_VERTICES));
+  const point = new Vector3();
+  for (let i = 0; i < count; i += step) {
+    box.expandByPoint(mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld));
+  }
+}
+
+/** A grid that fades out, with lines of one pixel at any distance. */
+function floor() {
+  const material = new ShaderMaterial({
+    transparent: true,
+    depthWrite: false,
+    uniforms: { cell: { value: 1 }, ink: { value: 0.5 } },
+    vertexShader: `
+      varying vec2 place;
+      varying vec2 from_center;
+      void main() {
+        vec4 world = modelMatrix * vec4(position, 1.0);
+        place = world.xz;
+        from_center = uv * 2.0 - 1.0;
+        gl_Position = projectionMatrix * viewMatrix * world;
+      }`,
+    fragmentShader: `
+      uniform float cell;
+      uniform float ink;
+      varying vec2 place;
+      varying vec2 from_center;
+      float lines(float size) {
+        vec2 at = place / size;
+        vec2 distance_px = abs(fract(at - 0.5) - 0.5) / max(fwidth(at), vec2(1e-6));
+        return 1.0 - min(min(distance_px.x, distance_px.y), 1.0);
+      }
+      void main() {
+        float fade = 1.0 - smoothstep(0.1, 0.75, length(from_center));
+        gl_FragColor = vec4(vec3(ink), fade * max(lines(cell) * 0.3, lines(cell * 5.0) * 0.55));
+      }`,
+  });
+  const mesh = new Mesh(new PlaneGeometry(2, 2).rotateX(-Math.PI / 2), material);
+  mesh.renderOrder = -1;
+  return mesh;
+}

@@ -1,0 +1,174 @@
+"""`view`: pages of files, pipes, caches and curves, of one file or two; without any network."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+import re
+import threading
+import urllib.error
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from anim.show.page import resources
+from cli.io import browser
+from tests.anim.caches.making import cache, written
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import built, refusal
+from tests.cli.test_table import BVH, CURVES, renamed
+from tests.fixtures.reading import split
+from tests.pages import needs_page
+
+MARKUP = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
+
+
+def facts(page: bytes) -> Any:
+    """What a page says about its files."""
+    found = re.search(rb'id="facts">(.*?)</script>', page, re.DOTALL)
+    assert found is not None
+    return json.loads(found[1])
+
+
+def embedded(page: bytes, name: str = "a") -> bytes:
+    """The GLB in a page."""
+    found = re.search(rf'id="{name}">(.*?)</script>'.encode(), page, re.DOTALL)
+    assert found is not None
+    return gzip.decompress(base64.b64decode(found[1]))
+
+
+@needs_page
+def test_a_page_of_a_file(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    run = call("view", fixture("biped"), "-o", tmp_path / "a.html", "--clip", "wave", "--at", "0.5", "--show", "bones")
+    assert run.out == b""
+    assert "a.html  " in run.err
+    page = (tmp_path / "a.html").read_bytes()
+    said = facts(page)
+    assert [each["name"] for each in said["files"]] == ["biped.glb"]
+    assert said["view"] == {"clip": "wave", "t": 0.5, "show": ["bones"]}
+    assert split(embedded(page))[0]["animations"]
+    assert embedded(page, "code").startswith(b"(()=>") or b"three" in embedded(page, "code").lower()
+
+
+@needs_page
+def test_the_same_input_gives_the_same_page(call: Call) -> None:
+    one = call("view", "-o", "-", stdin=built("arm")).product()
+    assert call("view", "-", "--out", "-", stdin=built("arm")).product() == one
+
+
+@needs_page
+def test_nothing_runs_but_two_scripts_and_nothing_is_loaded(call: Call) -> None:
+    page = call("view", "-o", "-", stdin=built("arm")).product().decode()
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)
+    assert policy is not None
+    assert "default-src 'none'" in policy[1]
+    assert "http" not in policy[1]
+    assert "unsafe-eval" not in policy[1].replace("wasm-unsafe-eval", "")
+    start = page.rpartition("<script>")[2].partition("</script>")[0].encode()
+    for script in (start, embedded(page.encode(), "code")):
+        assert f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'" in policy[1]
+    assert not re.search(r'(src|href)="', page.partition("<script")[0])
+
+
+@needs_page
+def test_names_with_markup_stay_text(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(renamed(built("arm"), [MARKUP, MARKUP]))
+    page = call("view", tmp_path / "a.glb", "-o", "-", "--title", MARKUP, "--clip", "*script*").product().decode()
+    assert "alert(1)</script>" not in page
+    assert "<img src=x" not in page
+    assert html.escape(MARKUP) in page
+    assert facts(page.encode())["view"]["clip"] == MARKUP
+
+
+@needs_page
+def test_two_files_with_errors_over_time(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    small = tmp_path / "small.glb"
+    call("optimize", fixture("biped"), small, "--max-error", "3%", "--effort", "fast")
+    run = call("view", fixture("biped"), small, "-o", tmp_path / "ab.html")
+    said = facts((tmp_path / "ab.html").read_bytes())
+    worst = max(each["max"] for each in said["errors"].values())
+    report = json.loads(call("diff", fixture("biped"), small, "--format", "json", "--shell", "0").product())
+    assert worst == pytest.approx(report["max_error_m"], rel=1e-3)
+    first = said["panels"][0]["rows"][0]["link"]
+    curve = said["errors"][str(first["clip"])]
+    assert max(curve["errors"]) == pytest.approx(worst, rel=1e-3)
+    assert first["time"] == pytest.approx(curve["times"][curve["errors"].index(max(curve["errors"]))], abs=1e-3)
+    assert "max " in run.err
+
+
+@needs_page
+def test_caches_and_curves(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.npz").write_bytes(written(cache(), "a.npz")[0].files["a.npz"])
+    (tmp_path / "walk.bvh").write_text(BVH)
+    (tmp_path / "door.json").write_bytes(_curves(call, tmp_path))
+    for name in ("a.npz", "walk.bvh", "door.json"):
+        page = call("view", tmp_path / name, "-o", "-").product()
+        assert split(embedded(page))[0]["animations"]
+    assert facts(call("view", "-o", "-", stdin=BVH.encode()).product())["files"][0]["notes"]
+
+
+def _curves(call: Call, folder: Path) -> bytes:
+    """Curves in JSON, which state their convention."""
+    (folder / "door.csv").write_text(CURVES)
+    options = ("--order", "XYZ", "--axes", "extrinsic", "--unit", "deg")
+    call("from-euler", folder / "door.csv", folder / "door.glb", *options)
+    return call("to-euler", folder / "door.glb", "-", "--format", "json").product()
+
+
+@needs_page
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("-", "-"), "can't both be stdin"),
+        (("-", "-o", "page.png"), "no .html file"),
+        (("-", "-o", "a.html", "--show", "bones,fire"), "'fire'"),
+    ],
+)
+def test_wrong_usage(args: tuple[str, ...], words: str, call: Call) -> None:
+    assert words in refusal(call("view", *args, stdin=built("arm")), 2)
+
+
+@needs_page
+def test_a_clip_or_node_that_is_not_there(call: Call) -> None:
+    assert "nothing" in refusal(call("view", "-o", "-", "--clip", "nothing", stdin=built("arm")), 5)
+    assert "nobody" in refusal(call("view", "-o", "-", "--node", "nobody", stdin=built("arm")), 5)
+
+
+def test_without_its_script_the_command_that_builds_it_is_named(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resources, "SCRIPT", "bundle/absent.js")
+    run = call("view", "-o", "-", stdin=built("arm"))
+    assert run.code == 4
+    assert resources.BUILD_COMMAND in run.err
+
+
+def test_one_answer_on_the_loopback_and_no_second() -> None:
+    got: list[object] = []
+
+    def visit(address: str) -> bool:
+        def fetch() -> None:
+            for url in (address.rpartition("/")[0] + "/favicon.ico", address):
+                try:
+                    with urllib.request.urlopen(url, timeout=10) as answer:
+                        got.append(answer.read())
+                except urllib.error.HTTPError as error:
+                    got.append(error.code)
+
+        threading.Thread(target=fetch).start()
+        assert address.startswith("http://127.0.0.1:")
+        return True
+
+    assert browser.show_once(b"<p>page", open_url=visit)
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread():
+            thread.join(10)
+    assert got == [404, b"<p>page"]
+
+
+def test_without_a_browser_it_ends() -> None:
+    assert not browser.show_once(b"", open_url=lambda _: False)
+    assert not browser.show_once(b"", open_url=lambda _: True, wait=0.05)
