@@ -117,7 +117,10 @@ COMMANDS = {
     ),
     "trim": CommandInfo(
         "Keep one time range of clips.",
-        ("gltf-anim trim walk.glb step.glb --from 0.25 --to 0.75 --rebase",),
+        (
+            "gltf-anim trim walk.glb step.glb --from 0.25 --to 0.75 --rebase",
+            "gltf-anim trim . -o 'out/{path}' --rebase",
+        ),
     ),
     "loop": CommandInfo(
         "Report whether clips loop, and close them.",

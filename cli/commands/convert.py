@@ -10,12 +10,13 @@ import typer
 
 from anim.gltf.io import images
 from anim.gltf.io.source import external_files
-from cli import text
+from cli import errors, text
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
 from cli.reports import image_notes
 from cli.streams import record_files
+from cli.workflows import many_files
 
 USD_SUFFIXES = (".usdz", ".usdc", ".usda")
 Output = Annotated[
@@ -31,7 +32,9 @@ Output = Annotated[
 def command(
     input: common.Input = "-",
     output: Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     embed: Annotated[bool, typer.Option("--embed", help="Embed external images, if their files exist.")] = False,
     clip: Annotated[
         list[str] | None,
@@ -45,7 +48,7 @@ def command(
     ] = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
-) -> None:
+) -> int:
     """Convert between .glb and .gltf, where nothing else changes, or to skinned USD.
 
     A .glb contains buffer 0 in its binary chunk, and further buffers as data URIs. A .gltf has a companion .bin file.
@@ -58,7 +61,6 @@ def command(
     vertex, skinned by USD, at and half-way between frames.
     """
     voice = text.Reporter(quiet)
-    began = time.perf_counter()
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     if PurePath(output).suffix.lower() in USD_SUFFIXES:
@@ -67,9 +69,18 @@ def command(
         if embed:
             raise UsageError("--embed does not apply to USD")
         skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, voice=voice)
-        return
+        return errors.DONE
     if clip is not None or fps is not None:
         raise UsageError(f"{'--fps' if clip is None else '--clip'} applies to USD only (.usdz, .usdc, .usda)")
+
+    def edit(input: str, output: str) -> None:
+        _convert(input, output, embed=embed, dry_run=dry_run, voice=voice)
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+
+
+def _convert(input: str, output: str, *, embed: bool, dry_run: bool, voice: text.Reporter) -> None:
+    began = time.perf_counter()
     if not dry_run:
         documents.check_output(output)
     with documents.source(input, voice) as source:

@@ -17,11 +17,12 @@ from anim.model import Clip, Track
 from anim.operations import ease as by_segment
 from anim.operations import time_warp as by_range
 from anim.operations.selection import Selection
-from cli import units
+from cli import errors, units
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
 from cli.text import Reporter
+from cli.workflows import many_files
 from cli.workflows.edit_clips import Clips, edit_clips
 
 
@@ -39,7 +40,9 @@ CUBIC = Interpolation("cubicspline")
 def command(
     input: common.Input = "-",
     output: common.Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     ease: Annotated[
         str,
         typer.Option(
@@ -73,7 +76,7 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
-) -> None:
+) -> int:
     """Change the speed of motion between keys by an easing.
 
     --per segment eases every key interval: the values of the keys and the path between them stay, only the speed along
@@ -88,7 +91,7 @@ def command(
     """
     if list_eases:
         documents.write_text(_table())
-        return
+        return errors.DONE
     easing = parse(ease)
     share, angle = (
         units.parse_fraction(tolerance, "--tolerance"),
@@ -124,17 +127,21 @@ def command(
             )
         return eased
 
-    selection = Selection(clip or (), node or (), path or ())
-    edit_clips(
-        input,
-        output,
-        selection,
-        change,
-        Reporter(quiet, verbose),
-        dry_run=dry_run,
-        measure=False,
-        notes=lambda before, after: _notes(before, after, easing, per),
-    )
+    selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
+
+    def edit(input: str, output: str) -> None:
+        edit_clips(
+            input,
+            output,
+            selection,
+            change,
+            voice,
+            dry_run=dry_run,
+            measure=False,
+            notes=lambda before, after: _notes(before, after, easing, per),
+        )
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
 
 
 MAX_SAMPLE_SPACING_S = 0.1  # s; keys nearer than this are samples of a motion rather than poses

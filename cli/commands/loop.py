@@ -25,6 +25,7 @@ from cli.options import common
 from cli.options.common import Format
 from cli.reports import json_report
 from cli.text import Reporter, format_length, format_speed
+from cli.workflows import many_files
 from cli.workflows.edit_clips import edit_clips
 
 SCHEMA = 1
@@ -80,6 +81,7 @@ def command(
         return
     if find:
         raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
+    many_files.refuse_folder(input, help='a recipe closes loops of many files: steps = ["loop"], then gltf-anim run')
     closing_of = _Closing(blend, input)
     edit_clips(input, output or documents.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
 

@@ -14,13 +14,16 @@ from anim.operations.time_warp import warp
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter
+from cli.workflows import many_files
 from cli.workflows.edit_clips import check_clips, edit_clips
 
 
 def command(
     input: common.Input = "-",
     output: common.Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     speed: Annotated[
         float | None, typer.Option("--speed", metavar="N", help="Speed factor; 0.25 is four times slower.")
     ] = None,
@@ -39,7 +42,7 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
-) -> None:
+) -> int:
     """Change the timing of clips: speed, duration, direction, delay.
 
     Times are the clip's own seconds, not frames. Values stay, and tangents are scaled by the chain rule: all changes
@@ -65,4 +68,7 @@ def command(
             tracks=tracks,
         )
 
-    edit_clips(input, output, selection, change, voice, dry_run=dry_run, measure=False)
+    def edit(input: str, output: str) -> None:
+        edit_clips(input, output, selection, change, voice, dry_run=dry_run, measure=False)
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)

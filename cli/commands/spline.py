@@ -18,16 +18,20 @@ from anim.operations.selection import Selection
 from anim.operations.spline import max_key_change
 from anim.operations.spline import spline as splined
 from anim.units import format_number
+from cli import errors
 from cli.io import documents
 from cli.options import common
 from cli.text import Reporter
+from cli.workflows import many_files
 from cli.workflows.edit_clips import Clips, edit_clips
 
 
 def command(
     input: common.Input = "-",
     output: common.Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     tangents: Annotated[
         str, typer.Option("--tangents", metavar="NAME", help="Tangent rule; see --list.")
     ] = DEFAULT_RULE,
@@ -45,7 +49,7 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
-) -> None:
+) -> int:
     """Put smooth curves through keys: CUBICSPLINE with tangents by a rule.
 
     The rule time-aware suits most motion. monotone never overshoots: for weights, or feet on the floor. natural and
@@ -56,7 +60,7 @@ def command(
     """
     if list_rules:
         documents.write_text(_table())
-        return
+        return errors.DONE
     rule = parse(tangents)
 
     def change(each: Clip, tracks: frozenset[int], scene: Callable[[], Scene]) -> Clip:
@@ -70,8 +74,12 @@ def command(
         is_open = (cyclic or rule.loop) and open_tracks(each)
         return f"close it first: {closing_command(each, number)}" if is_open else ""
 
-    selection = Selection(clip or (), node or (), path or ())
-    edit_clips(input, output, selection, change, Reporter(quiet, verbose), dry_run=dry_run, notes=_notes, advise=advise)
+    selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
+
+    def edit(input: str, output: str) -> None:
+        edit_clips(input, output, selection, change, voice, dry_run=dry_run, notes=_notes, advise=advise)
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
 
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:

@@ -13,6 +13,7 @@ from anim.operations.trim import trim as trimmed
 from cli.errors import UsageError
 from cli.options import common
 from cli.text import Reporter
+from cli.workflows import many_files
 from cli.workflows.edit_clips import Clips, check_clips, edit_clips
 
 MAX_LISTED_TIMES = 4  # times in a note
@@ -21,7 +22,9 @@ MAX_LISTED_TIMES = 4  # times in a note
 def command(
     input: common.Input = "-",
     output: common.Output = "-",
+    more: common.More = None,
     *,
+    out: common.Out = None,
     start: common.From = None,
     end: common.To = None,
     rebase: Annotated[bool, typer.Option("--rebase", help="Move the start of each clip to 0 s.")] = False,
@@ -29,7 +32,7 @@ def command(
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
-) -> None:
+) -> int:
     """Keep one time range of clips, from --from to --to seconds.
 
     Keys inside the range stay unchanged; new keys at both ends have the exact value and tangent of the motion there.
@@ -40,16 +43,20 @@ def command(
     if start is None and end is None and not rebase:
         check_clips(input, selection, voice)
         raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")
-    edit_clips(
-        input,
-        output,
-        selection,
-        lambda each, tracks, _: trimmed(each, start=start, end=end, rebase=rebase, tracks=tracks),
-        voice,
-        dry_run=dry_run,
-        measure=False,
-        notes=lambda before, _: _moved_apart(before, start or 0.0) if rebase else (),
-    )
+
+    def edit(input: str, output: str) -> None:
+        edit_clips(
+            input,
+            output,
+            selection,
+            lambda each, tracks, _: trimmed(each, start=start, end=end, rebase=rebase, tracks=tracks),
+            voice,
+            dry_run=dry_run,
+            measure=False,
+            notes=lambda before, _: _moved_apart(before, start or 0.0) if rebase else (),
+        )
+
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
 
 
 def _moved_apart(before: Clips, start: float) -> Iterator[str]:

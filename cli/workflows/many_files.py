@@ -38,14 +38,19 @@ def edit_named(
         if more:
             help = "the command takes IN and OUT; for more inputs name their outputs by --out"
             raise UsageError(f"got unexpected extra argument ({more[0]})", help=help)
-        if os.path.isdir(input):
-            raise UsageError(f"{input}: is a folder (expected a file)", help="all its files: -o 'out/{path}'")
+        refuse_folder(input, help="all its files: -o 'out/{path}'")
         edit(input, output)
         return errors.DONE
     if not pattern:
         raise UsageError("--out has an empty name")
     names = [input, *([] if output == documents.PIPE else [output]), *more]
     return edit_files(names, pattern, edit, voice, dry_run=dry_run)
+
+
+def refuse_folder(path: str, *, help: str) -> None:
+    """Raise UsageError if the input is a folder."""
+    if os.path.isdir(path):
+        raise UsageError(f"{path}: is a folder (expected a file)", help=help)
 
 
 def edit_files(

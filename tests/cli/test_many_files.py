@@ -1,4 +1,4 @@
-"""`resample` and `optimize` on many files: an output for each, by --out."""
+"""Commands on many files: an output for each, by --out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ import pytest
 from tests.cli.conftest import Call
 from tests.cli.running import built, help_line, refusal
 
-COMMANDS = (("resample", "--fps", "30"), ("optimize", "--effort", "fast"))
+COMMANDS = (
+    ("resample", "--fps", "30"),
+    ("optimize", "--effort", "fast"),
+    ("trim", "--from", "0.1"),
+    ("ease",),
+    ("spline",),
+    ("retime", "--speed", "2"),
+    ("convert",),
+)
 
 
 def outputs(folder: Path) -> set[str]:
@@ -40,6 +48,12 @@ def test_a_failing_file_is_named_and_the_rest_finishes(
     assert outputs(crowd / "out") == {"arm 1.glb", "b/tube.glb"}
     single = call(command, "in/arm 1.glb", "-", *options).product()
     assert (crowd / "out" / "arm 1.glb").read_bytes() == single
+
+
+def test_loops_of_a_folder_are_closed_by_a_recipe(crowd: Path, call: Call) -> None:
+    run = call("loop", "in", "out.glb")
+    assert "in: is a folder (expected a file)" in refusal(run, 2)
+    assert help_line(run) == 'a recipe closes loops of many files: steps = ["loop"], then gltf-anim run'
 
 
 def test_names_are_those_of_the_shell_too(crowd: Path, call: Call) -> None:
@@ -109,7 +123,9 @@ def test_options_about_one_file_are_refused(option: str, crowd: Path, call: Call
     assert (run.code, run.err) == (2, f"gltf-anim: {option} is about one file: leave out --out\n")
 
 
-@pytest.mark.parametrize("command", ["resample --fps 12", "optimize --max-error 1mm"])
+@pytest.mark.parametrize(
+    "command", ["resample --fps 12", "optimize --max-error 1mm", "trim --from 0.1", "convert", "ease"]
+)
 @pytest.mark.parametrize("output", [(), ("out",)])
 def test_a_folder_without_out_is_named_with_the_option(
     command: str, output: tuple[str, ...], folder: Path, call: Call

@@ -286,4 +286,4 @@ def _makes_gltf(command: Any) -> bool:
     if hasattr(command, "table"):
         return any(_makes_gltf(command.get_command(None, kind)) for kind in command.table)
     arguments = [each for each in command.params if each.param_type_name == "argument"]
-    return len(arguments) > 1 and (arguments[1].help or "").startswith("A .glb or .gltf file")
+    return len(arguments) > 1 and (arguments[1].help or "").startswith(("A .glb or .gltf file", "A .glb, .gltf, .usdz"))

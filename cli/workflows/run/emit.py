@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -21,6 +22,7 @@ from cli.workflows.run.steps import EDITING, Step
 HEADER = f"# made by `{PROGRAM} run --emit`"
 IN_BASH = '[ -n "${BASH_VERSION-}" ] || exec bash "$0"  # for bash: `sh` has no pipefail everywhere'
 EMBED = "--embed"
+NOT_IN_MAKE = "\t\n\r%;=*?[]~\\|&"  # in a rule they mean something, and an escape does not hold everywhere
 Escape: TypeAlias = Callable[[str], str]  # of a text in a rule
 
 
@@ -41,8 +43,10 @@ def makefile(jobs: Sequence[Job]) -> str:
     for job in jobs:
         _check_images(job)
         output, *inputs = (_in_make(name) for name in (job.output, job.input, *_other_inputs(job)))
-        command = _pipeline(job, "'$<'", "'$@'", escape=lambda text: text.replace("$", "$$"))
-        rules.append(f"{output}: {' '.join(inputs)}\n\t@mkdir -p '$(@D)'\n\t{command}\n")
+        folder = shlex.quote(PurePosixPath(job.output).parent.as_posix())
+        command = _pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output)))
+        lines = (each.replace("$", "$$") for each in (f"@mkdir -p -- {folder}", command))
+        rules.append(f"{output}: {' '.join(inputs)}\n\t" + "\n\t".join(lines) + "\n")
         names.append(output)
     head = [HEADER, ".DELETE_ON_ERROR:", ".PHONY: all", f"all: {' '.join(names)}\n"]
     return "\n".join(head + rules)
@@ -130,9 +134,11 @@ def _check_images(job: Job) -> None:
 
 
 def _in_make(name: str) -> str:
-    if any(c in name for c in " \t\n#%:;=*?[]~\\|&\"'`<>()"):
-        raise UsageError(f"'{name}': make has no such names", help="--emit ninja or shell")
-    return name.replace("$", "$$")
+    """A name as a target or prerequisite."""
+    found = next((c for c in name if c in NOT_IN_MAKE), "")
+    if found:
+        raise UsageError(f"'{name}': make has no names with {found!r}", help="--emit ninja or shell")
+    return re.sub(r"([ #:])", r"\\\1", name).replace("$", "$$")
 
 
 def _in_ninja(name: str) -> str:
