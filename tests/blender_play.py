@@ -1,4 +1,4 @@
-"""A glTF or USD file in Blender, frame by frame: run by a Python that has `bpy`, never imported. See tests/blender.py.
+"""A file of glTF, USD or Alembic in Blender, frame by frame: run by a Python that has `bpy`. See tests/blender.py.
 
     python blender_play.py FILE TASK OUT
 
@@ -25,7 +25,9 @@ def main(file: str, task: str, out: str) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = fps, 1.0
-    if ".usd" in file:
+    if file.endswith(".abc"):
+        bpy.ops.wm.alembic_import(filepath=file, as_background_job=False)
+    elif ".usd" in file:
         bpy.ops.wm.usd_import(filepath=file)
     else:
         bpy.ops.import_scene.gltf(filepath=file, merge_vertices=False, disable_bone_shape=True)

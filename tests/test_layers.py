@@ -61,7 +61,7 @@ FORBIDDEN_METHODS = {"read_bytes", "write_bytes", "read_text", "write_text"}
 FORBIDDEN_ATTRIBUTES = {"sys.stdout", "sys.stderr", "sys.stdin", "sys.argv", "os.environ"}
 FORBIDDEN_ATTRIBUTES |= {"time.time", "np.random.seed", "np.fromfile", "np.load", "np.memmap"}
 LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplotlib", "PIL", "png"}
-LAZY |= {"mujoco", "pxr", "dask", "distributed", "rapier3d"}
+LAZY |= {"mujoco", "pxr", "alembic3d", "imath", "dask", "distributed", "rapier3d"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
     "caches.formats": "flipbook_reader gltf mesh_sequence usd_materials usd_package usd_writer",

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from anim.caches.formats import gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
+from anim.caches.formats import alembic, gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.signatures import Signature, is_mdd, is_npz, is_obj, is_stl, is_usdz, starts_with
 from anim.caches.storage import Inputs, Outputs
@@ -36,14 +36,15 @@ class Files(Enum):
 
 @dataclass(frozen=True, slots=True)
 class CacheFormat:
-    """One format. about: for --help. begins: signature of its files, for input without a name.
+    """One format. about: for --help. read: None if it is only written. begins: signature of its files, for input
+    without a name.
 
     takes: names of the fields of ReadOptions ("input_fps") and WriteOptions that it supports. holds: "normals",
     "tangents", if it stores them beside positions. files: the files of one cache.
     """
 
     about: str
-    read: Read
+    read: Read | None
     write: Write
     begins: Signature
     takes: frozenset[str] = frozenset()
@@ -87,6 +88,14 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
     ".usdc": _usd(".usdc", "USD, binary (extra usd)", starts_with(b"PXR-USDC")),
     ".usda": _usd(".usda", "USD, text (extra usd)", starts_with(b"#usda")),
     ".usdz": _usd(".usdz", "USD with its images, a package (extra usd)", is_usdz),
+    ".abc": CacheFormat(
+        "Alembic, written only (extra alembic)",
+        None,
+        alembic.write,
+        starts_with(b"Ogawa"),
+        frozenset(("source",)),
+        NORMALS,
+    ),
     ".glb": CacheFormat(
         "glTF: morph targets or a flip-book",
         gltf.read,
@@ -103,13 +112,19 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
 }
 
 
+READABLE = tuple(ending for ending, each in CACHE_FORMATS.items() if each.read is not None)
+
+
 def reader_for(ending: str) -> Read:
     """Return the reader of a format: reader_for(".pc2")(inputs, ReadOptions()) → VertexCache.
 
     It reads this format from files of any name; invalid contents raise FormatError, in chunks too. Raises
-    UnsupportedError for an unknown file extension.
+    UnsupportedError for an unknown file extension, or a format that is only written.
     """
-    return partial(_read, _of(ending).read)
+    read = _of(ending).read
+    if read is None:
+        raise UnsupportedError(f"{ending[1:]} is only written, not read", help="USD, PC2 and MDD are read")
+    return partial(_read, read)
 
 
 def writer_for(ending: str) -> Write:

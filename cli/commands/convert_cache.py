@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from anim.caches.options import ReadOptions
-from anim.caches.registry import CACHE_FORMATS
+from anim.caches.registry import CACHE_FORMATS, READABLE
 from anim.caches.transforms import resample, statistics, up_axis
 from anim.caches.transforms import vertex_order as orders
 from anim.model import FrameChunk, VertexCache
@@ -24,7 +24,7 @@ from cli.workflows.bake_clip import choose_clip, onto_source
 
 Cache = Annotated[
     str,
-    typer.Argument(metavar="IN", help=f"A cache: {caches.FORMATS}; '-' for stdin.", show_default=False),
+    typer.Argument(metavar="IN", help=f"A cache: {', '.join(READABLE)}; '-' for stdin.", show_default=False),
 ]
 
 

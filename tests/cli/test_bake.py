@@ -198,7 +198,7 @@ def test_tangents_of_a_real_file(call: Call, asset: Find, tmp_path: Path) -> Non
 
 
 def test_an_output_of_no_format(call: Call, fixture: Fixture, tmp_path: Path) -> None:
-    assert "unsupported cache format '.abc'" in refusal(call("bake", fixture("arm"), tmp_path / "arm.abc"), 2)
+    assert "unsupported cache format '.fbx'" in refusal(call("bake", fixture("arm"), tmp_path / "arm.fbx"), 2)
 
 
 @pytest.mark.parametrize("name", sorted(["skin/ibm_invalid_count.gltf", "skin/unresolved_joint.gltf"]))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
+from anim.caches.registry import CACHE_FORMATS, READABLE, Files, sniff_format
 from anim.caches.transforms.resample import at_time
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Fixture
@@ -82,6 +82,9 @@ def test_format_is_written_whatever_the_name_and_read_back(ending: str, name: st
     call("convert-cache", walk, out, "--format", ending[1:]).product()
     main = next(path for path in (out, out.with_stem(f"{out.stem}_00001")) if path.exists())
     assert told(main.read_bytes()) == ending
+    if ending not in READABLE:
+        assert "is only written, not read" in refusal(call("convert-cache", out, walk.with_name("back.npz")), 4)
+        return
     call("convert-cache", out, walk.with_name("back.npz")).product()
     assert times(walk.with_name("back.npz")) == pytest.approx(times(walk), abs=1e-6)
 
@@ -160,7 +163,7 @@ def test_directions_that_are_lost_are_said(tmp_path: Path, call: Call) -> None:
 
 
 def test_one_frame_of_any_format_reads_the_same_by_name_and_pipe(tmp_path: Path, call: Call) -> None:
-    for ending in (*WHOLE, *FRAMES):
+    for ending in (each for each in (*WHOLE, *FRAMES) if each in READABLE):
         files = written(at_time(cache(normals=False), 0), f"a{ending}", None)[0].files
         (tmp_path / f"a{ending}").write_bytes(files[f"a{ending}"])
         call("convert-cache", tmp_path / f"a{ending}", tmp_path / "one.npz").product()

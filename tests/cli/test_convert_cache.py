@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anim.caches.registry import CACHE_FORMATS
+from anim.caches.registry import READABLE
 from tests.anim.caches.making import FACES, cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal, shell
 
 LOSSY = {".glb": 1e-4, ".png": 2e-4}
-EVERY = [ending for ending in CACHE_FORMATS if ending != ".stl"]
+EVERY = [ending for ending in READABLE if ending != ".stl"]
 OPTIONS = {".glb": ["--max-error", "0.1mm"]}
 
 
@@ -140,7 +140,7 @@ def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["a.abc"], "unsupported cache format '.abc'"),
+        (["a.fbx"], "unsupported cache format '.fbx'"),
         (["a.npz", "--max-error", "1mm"], "--max-error does not apply to .npz"),
         (["a.mdd", "--preset", "unity"], "--preset does not apply to .mdd"),
         (["a.glb", "--max-error", "1parsec"], "expected a length"),
