@@ -35,7 +35,7 @@ def embed_images(json: Json, document: Document, packing: Packing, resolve: Reso
     drawn: set[int] = set()
     faults: dict[int, str] = {}
     accessors = Accessors(document)
-    for i in sorted(each for each in wanted if type(each) is int and 0 <= each < len(images)):
+    for i in sorted(each for each in wanted if 0 <= each < len(images)):
         try:
             data = image_data(document, i, accessors, resolve)
             _store(images[i], data, packing)
@@ -64,13 +64,12 @@ def _store(image: Json, data: Bytes, packing: Packing) -> None:
     image["mimeType"] = media
 
 
-def _sources(texture: Json) -> Iterator[Any]:
-    """Values of `source` in a texture and in its extensions."""
+def _sources(texture: Json) -> Iterator[int]:
+    """Images that a texture and its extensions name."""
     extensions = texture.get("extensions")
     named = extensions if isinstance(extensions, dict) else {}
     for part in (texture, *(named.get(name) for name in (*PREFERRED, BASISU))):
-        if isinstance(part, dict) and "source" in part:
-            yield part["source"]
+        yield from _own_source(part)
 
 
 def _choose_source(texture: Any, drawn: Collection[int]) -> bool:

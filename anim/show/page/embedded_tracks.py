@@ -18,7 +18,8 @@ def rewrite_tracks(json: Json, accessors: Accessors) -> list[str]:
     """Replace pointers by plain channels, in place, and return notes about tracks not shown.
 
     Pointers to a mesh's weights become a channel for each node with the mesh, unless one has weights of its own.
-    Channels of nodes outside the default scene lose their target, since three.js finds no node for them.
+    Channels of nodes outside the default scene, or of a path that glTF does not know, lose their target: three.js
+    finds none for them.
     """
     shown = shown_nodes(json)
     pointers: list[str] = []
@@ -36,10 +37,10 @@ def rewrite_tracks(json: Json, accessors: Accessors) -> list[str]:
             else:
                 channels.append(channel)
         for i, channel in enumerate(channels):
-            target = channel["target"]
-            if target.get("node", -1) >= 0 and target["node"] not in shown:
+            target, is_known = channel["target"], channel_target(channel) is not None
+            if "node" in target and (not is_known or target["node"] not in shown):
                 channels[i] = {**channel, "target": {key: target[key] for key in target if key != "node"}}
-                outside += 1
+                outside += is_known
         animation["channels"] = channels
     return _notes(pointers, outside)
 

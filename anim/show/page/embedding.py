@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from anim.errors import FormatError, UnsupportedError
 from anim.gltf.document import Document, Json, copy_json, json_array
@@ -15,11 +16,14 @@ from anim.gltf.validation.buffer_layout import DRACO
 from anim.gltf.validation.channel_targets import EXTENSION as POINTER
 from anim.gltf.writing.draco_decoding import decode_draco
 from anim.show.page.embedded_images import embed_images
+from anim.show.page.embedded_names import separate_meshes, separate_names
 from anim.show.page.embedded_nodes import show_scene
+from anim.show.page.embedded_references import drop_references
 from anim.show.page.embedded_tracks import rewrite_tracks
 from anim.show.page.packing import Packing
 from anim.show.page.sticks import add_sticks
 
+UNLIT = "KHR_materials_unlit"  # three.js fails on it where the file does not name it
 MAX_INFLUENCES = 4  # per vertex in three.js
 # Extensions that three.js knows; it warns of all others that a file requires
 KNOWN = frozenset(
@@ -47,7 +51,8 @@ def embed(document: Document, resolve: Resolve | None = None) -> Embedded:
 
     Buffers and images are packed in. Pointers to a node's translation, rotation, scale or weights become plain
     channels, Draco becomes plain accessors; images that cannot be read are left out of their materials; a file without
-    a mesh gets sticks. Everything else, names included, is unchanged, and so is `document`. meshopt stays compressed.
+    a mesh gets sticks; names that three.js takes for one differ; there are no cameras. Everything else is unchanged,
+    and so is `document`. meshopt stays compressed.
     resolve: returns the bytes of a file in the input's folder by its relative path; None if the input has no folder.
     Raises FormatError or UnsupportedError if clips or meshes cannot be read.
     """
@@ -61,6 +66,9 @@ def embed(document: Document, resolve: Resolve | None = None) -> Embedded:
     json, packing = copy_json(document.json), Packing(document)
     notes += show_scene(json)
     notes += rewrite_tracks(json, Accessors(document))
+    notes += drop_references(json)
+    separate_meshes(json)
+    notes += separate_names(json)
     notes += embed_images(json, document, packing, resolve)
     notes += _name_extensions(json)
     return Embedded(b"".join(piece.tobytes() for piece in container.glb(packing.document(json))), notes)
@@ -109,7 +117,9 @@ def _check_meshes(document: Document) -> list[str]:
 
 
 def _name_extensions(json: Json) -> list[str]:
-    """Drop required extensions that three.js warns of, in place; return a note about them."""
+    """Drop required extensions that three.js warns of, and name those it needs, in place; return a note."""
+    if UNLIT not in json.get("extensionsUsed", ()) and any(map(_is_unlit, json_array(json, "materials"))):
+        json["extensionsUsed"] = [*json.get("extensionsUsed", ()), UNLIT]
     required = json.pop("extensionsRequired", [])
     if known := [name for name in required if name in KNOWN]:
         json["extensionsRequired"] = known
@@ -118,6 +128,11 @@ def _name_extensions(json: Json) -> list[str]:
         if DRACO in json.get(key, ()):
             json[key] = [name for name in json[key] if name != DRACO]
     return [f"shown without {', '.join(unknown)}, which the file requires"] if unknown else []
+
+
+def _is_unlit(material: Any) -> bool:
+    extensions = material.get("extensions") if isinstance(material, dict) else None
+    return isinstance(extensions, dict) and UNLIT in extensions
 
 
 def _counted(count: int, one: str, many: str) -> str:

@@ -22,9 +22,10 @@ from anim.gltf.writing import draco_decoding, writer
 from anim.operations.resample import resample
 from anim.show.page import embedding
 from anim.show.page.embedding import embed
+from anim.skinning.bake import bake
 from tests import draco
 from tests.files import opened, opened_fixture, opened_path
-from tests.judge import judge, needs_judge
+from tests.judge import judge, needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate_many
 
 Find = Callable[[str], Path]
@@ -51,7 +52,8 @@ def _textured(*images: Json, textures: list[Json] | None = None, **more: Any) ->
     found = textures or [{"source": i} for i in range(len(images))]
     surface = {"baseColorFactor": [1, 0, 0, 1], "baseColorTexture": {"index": 0}}
     material = {"pbrMetallicRoughness": surface, "normalTexture": {"index": len(found) - 1}, "extras": {"aTexture": 1}}
-    json = {**copy_json(document.json), "images": list(images), "textures": found, "materials": [material], **more}
+    json = {**copy_json(document.json), "images": list(images), "textures": found, **more}
+    json["materials"][0] = material
     return replace(document, json=json)
 
 
@@ -192,9 +194,8 @@ def test_an_image_that_cannot_be_read_is_noted(image: Json, words: str, tmp_path
     assert found.notes[0].startswith("1 image not drawn: image 0 (")
     assert words in found.notes[0]
     content = _content(found.glb)
-    assert content["materials"] == [
-        {"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}, "extras": {"aTexture": 1}}
-    ]
+    bare = {"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}, "extras": {"aTexture": 1}}
+    assert content["materials"][0] == bare
     assert Image.open(io.BytesIO(_image(found.glb, 0)[0])).getpixel((0, 0)) == 255
     assert b"uri" not in found.glb
 
@@ -265,6 +266,14 @@ def test_tracks_outside_the_scene_have_no_target() -> None:
     assert not any("node" in c["target"] for clip in _content(found.glb)["animations"] for c in clip["channels"])
 
 
+def test_a_path_that_gltf_does_not_know_has_no_target() -> None:
+    document = _edited("morph_cube")
+    document.json["animations"][0]["channels"].append({"sampler": 0, "target": {"node": 0, "path": "color"}})
+    found = embed(document)
+    assert not found.notes
+    assert _content(found.glb)["animations"][0]["channels"][-1]["target"] == {"path": "color"}
+
+
 def test_extensions_that_three_does_not_know_are_not_required() -> None:
     document = _edited(
         "morph_cube",
@@ -298,3 +307,60 @@ def test_a_file_that_cannot_be_read_is_refused(asset: Find) -> None:
 def test_a_document_without_buffers_is_a_glb() -> None:
     document = opened(b'{"asset": {"version": "2.0"}, "buffers": []}')
     assert _content(embed(document).glb) == {"asset": {"version": "2.0"}, "scenes": [{}], "scene": 0}
+
+
+@needs_judge
+@pytest.mark.parametrize("names", [("ab", "ab", "ab_1"), ("constructor", "toString"), ("a.b", "ab", "[a]b", "ab_2")])
+def test_nodes_that_three_takes_for_one_move_on_their_own(names: tuple[str, ...], tmp_path: Path) -> None:
+    document = _edited("biped")
+    for i, node in enumerate(document.json["nodes"]):
+        node["name"] = names[i % len(names)]
+    found = embed(document)
+    assert "names changed" in found.notes[0]
+    (tmp_path / "page.glb").write_bytes(found.glb)
+    scene, clip = reader.scene(document), reader.clips(document)[0]
+    expected = bake(scene, clip, times=np.array([0.3])).load_all().positions[0]
+    assert np.abs(vertices(tmp_path / "page.glb", clip=0, time=0.3) - expected).max() < 1e-5
+
+
+def test_equal_names_alone_stay() -> None:
+    document = _edited("biped")
+    for node in document.json["nodes"]:
+        node["name"] = "joint.001"
+    found = embed(document)
+    assert not found.notes
+    assert {node["name"] for node in _content(found.glb)["nodes"]} == {"joint.001"}
+
+
+@needs_judge
+def test_nodes_that_share_a_mesh_of_several_primitives_morph_on_their_own(tmp_path: Path) -> None:
+    document = _edited("morph_cube")
+    json = document.json
+    json["meshes"][0]["primitives"].append(dict(json["meshes"][0]["primitives"][0]))
+    json["nodes"].append({"mesh": 0, "name": "second", "translation": [5, 0, 0]})
+    json["scenes"][0]["nodes"].append(1)
+    for clip in json["animations"]:
+        clip["channels"][0]["target"]["node"] = 1
+    (tmp_path / "page.glb").write_bytes(embed(document).glb)
+    scene, clip = reader.scene(document), reader.clips(document)[0]
+    expected = bake(scene, clip, times=np.array([0.4]), rigid=True).load_all().positions[0]
+    assert np.abs(vertices(tmp_path / "page.glb", clip=0, time=0.4) - expected).max() < 1e-5
+
+
+def test_what_three_fails_on_is_left_out() -> None:
+    document = _edited("morph_cube", cameras=[{}], materials=[{"extensions": {"KHR_materials_unlit": {}}}, 3])
+    json = document.json
+    json["extensions"] = {
+        "KHR_lights_punctual": {"lights": [{"type": "lamp", "name": 7}, 5, {"type": "spot", "spot": 1}]}
+    }
+    json["nodes"][0] |= {"camera": 0}
+    json["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": i}}} for i in (0, 1, 2, 3, "x")]
+    json["meshes"][0]["primitives"][0]["material"] = 1
+    json["scenes"][0]["name"] = 5
+    content = _content(embed(document).glb)
+    assert embed(document).notes == ["6 references to missing materials or lights left out"]
+    assert [node.get("extensions") for node in content["nodes"][1:]].count({}) == 5
+    assert "cameras" not in content
+    assert "name" not in content["scenes"][0]
+    assert "material" not in content["meshes"][0]["primitives"][0]
+    assert content["extensionsUsed"] == ["KHR_materials_unlit"]
