@@ -72,7 +72,9 @@ def step_frame(
     old = np.empty_like(p)
     edge_multipliers, hinge_multipliers = np.zeros(len(edges)), np.zeros(len(hinges))
     for s in range(len(targets)):
-        old[:] = p
+        for i in range(len(p)):
+            for c in range(3):  # assignment of the whole array would compile the words of its error: two seconds
+                old[i, c] = p[i, c]
         edge_multipliers[:] = 0.0
         hinge_multipliers[:] = 0.0
         for i in range(len(p)):

@@ -128,27 +128,31 @@ class RapierWorld:
         """Return the contacts that pushed a body in the last step, the strongest of each pair of colliders.
 
         Each: the other body, the distance of the shapes at the start of the step, the normal (3,) from the other, and
-        the point (3,).
+        the point (3,). Of shapes of several parts, whose contacts Rapier joins and gives no impulses, the nearest.
         """
         found = []
         for handle in self._bodies[index].colliders:
             for pair in self._world.narrow_phase.contact_pairs_with(handle):
+                if not pair.total_impulse_magnitude():
+                    continue
                 is_second = self._colliders[pair.collider2.index][0] == index
                 other = self._colliders[(pair.collider1 if is_second else pair.collider2).index][0]
-                contacts = [(point, manifold.data) for manifold in pair.manifolds for point in manifold.points]
-                contacts = [each for each in contacts if each[0].impulse > 0]
+                contacts = [(point, manifold) for manifold in pair.manifolds for point in manifold.points]
                 if contacts:
-                    point, data = max(contacts, key=lambda each: each[0].impulse)
-                    sign = 1.0 if is_second else -1.0
-                    at = self._contact_point(index, data)
-                    found.append((other, float(point.dist), sign * np.array(data.normal.to_tuple()), at))
+                    point, manifold = max(contacts, key=lambda each: (each[0].impulse, -each[0].dist))
+                    normal = (1.0 if is_second else -1.0) * np.array(manifold.data.normal.to_tuple())
+                    at = self._contact_point(handle, manifold, is_second)
+                    found.append((other, float(point.dist), normal, at))
         return found
 
-    def _contact_point(self, index: int, data: Any) -> Floats:
-        """World position of a manifold's contacts, in the middle; the body's own without any."""
-        sets = self._world.rigid_bodies
-        points = [data.solver_contact_world_points(each, sets)[0].to_tuple() for each in data.solver_contacts]
-        return np.asarray(np.mean(points or [self._bodies[index].translation.to_tuple()], axis=0))
+    def _contact_point(self, handle: Any, manifold: Any, is_second: bool) -> Floats:
+        """World position of a manifold's contacts, in the middle; handle: of the collider that is the second or not."""
+        sets, data = self._world.rigid_bodies, manifold.data
+        points = [data.solver_contact_world_points(each, sets)[0] for each in data.solver_contacts]
+        if not points:
+            own = self._world.colliders[handle].position
+            points = [own.transform_point(each.local_p2 if is_second else each.local_p1) for each in manifold.points]
+        return np.asarray(np.mean([each.to_tuple() for each in points], axis=0))
 
     def has_failed(self) -> bool:
         """Return whether Rapier took a body out in this step, whose state was no longer finite."""
