@@ -62,6 +62,14 @@ def test_tracks_are_put_into_the_driving_clip(fixture: Fixture, call: Call, tmp_
 
 
 @needs_rapier
+def test_nodes_without_meshes_are_no_bodies(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    run = call("simulate", "rigid", fixture("wall"), tmp_path / "out.glb", "--body", "*", "--duration", "0.1")
+    assert run.code == 0, run.err
+    assert "of --body without a mesh of their own are no bodies" in run.err
+    assert "31 bodies" in run.err
+
+
+@needs_rapier
 @pytest.mark.parametrize(
     ("name", "args", "code", "words"),
     [

@@ -44,6 +44,18 @@ def add_chosen(description: PhysicsDescription, scene: Scene, chosen: ChosenNode
     return replace(description, motions=motions, colliders=colliders)
 
 
+def split_by_mesh(scene: Scene, nodes: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the nodes with a mesh of their own as bodies, and those without: all with one if none has.
+
+    A pattern also matches joints, cameras, and groups whose meshes are bodies themselves.
+    """
+    found = [bool(_mesh_nodes(scene, node, nodes)) for node in nodes]
+    if not any(found):
+        return nodes, ()
+    with_mesh = tuple(node for node, has in zip(nodes, found, strict=True) if has)
+    return with_mesh, tuple(node for node, has in zip(nodes, found, strict=True) if not has)
+
+
 def _mesh_nodes(scene: Scene, top: int, motions: Collection[int]) -> list[int]:
     """Nodes with a mesh at or below `top`, without those of another body below it."""
     found = []

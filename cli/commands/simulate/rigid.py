@@ -15,7 +15,7 @@ from anim.operations.selection import Selection
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.simulation.rigid_bodies.description import WATER_KG_M3, Material, Motion, PhysicsDescription
-from anim.simulation.rigid_bodies.node_globs import SHAPES, ChosenNodes, add_chosen
+from anim.simulation.rigid_bodies.node_globs import SHAPES, ChosenNodes, add_chosen, split_by_mesh
 from anim.simulation.rigid_bodies.options import SETTLED_M, RigidOptions
 from anim.simulation.rigid_bodies.simulate import (
     add_rigid_motion,
@@ -98,8 +98,12 @@ def command(
         document: Document, scene: Scene, driver: Clip, number: int | None
     ) -> tuple[Document, SimulationReport, str]:
         description = read_description(document, scene.skeleton)
+        bodies, without_mesh = split_by_mesh(scene, _nodes(scene, body))
+        if without_mesh:
+            names = text.plural(len(without_mesh), "node")
+            voice.info(f"note: {names} of --body without a mesh of their own are no bodies")
         chosen = ChosenNodes(
-            _nodes(scene, body),
+            bodies,
             shape.value,
             _nodes(scene, collider),
             Motion(density=density, follows_clip=False),
