@@ -125,8 +125,10 @@ def command(
     ω·h, and the motion in phase space. The same input and options give the same bytes. Requires matplotlib: pip install
     'gltf-anim[plot]'.
 
-    Without OUT, kitty, Ghostty, Konsole, iTerm2, WezTerm, foot and other terminals show the picture. --terminal prints
-    it in any other, in half-block characters, unless --protocol says more.
+    Without OUT the picture is printed in a terminal that shows pictures: kitty, Ghostty and Konsole (protocol kitty);
+    iTerm2, WezTerm, mintty and rio (iterm2); foot, mlterm and contour (sixel). In others, and inside tmux, screen and
+    Zellij, --terminal prints it in half-block characters, as wide as the terminal. --protocol names one that the
+    environment does not tell, such as sixel of xterm and Windows Terminal.
     """
     voice = Reporter(quiet)
     if ease and through is not None:

@@ -129,8 +129,10 @@ def command(
     Clips are drawn one below the other, with a row per method; in an animated image, side by side. Without --clip, only
     the first clip is drawn.
 
-    Without OUT, kitty, Ghostty, Konsole, iTerm2, WezTerm, foot and other terminals show the filmstrip. --terminal
-    prints it in any other, in half-block characters (fewer frames by default), unless --protocol says more.
+    Without OUT the filmstrip is printed in a terminal that shows pictures: kitty, Ghostty and Konsole (protocol kitty);
+    iTerm2, WezTerm, mintty and rio (iterm2); foot, mlterm and contour (sixel). In others, and inside tmux, screen and
+    Zellij, --terminal prints it in half-block characters, with fewer frames unless chosen. --protocol names one that
+    the environment does not tell, such as sixel of xterm and Windows Terminal.
     """
     voice = text.Reporter(quiet)
     began = time.perf_counter()
