@@ -10,7 +10,7 @@ import typer
 
 from anim.gltf.io import images
 from anim.gltf.io.source import external_files
-from cli import errors, text
+from cli import text
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
@@ -63,20 +63,29 @@ def command(
     voice = text.Reporter(quiet)
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
-    if PurePath(output).suffix.lower() in USD_SUFFIXES:
-        from cli.workflows import skinned_usd  # its skinning takes long to import
-
-        if embed:
-            raise UsageError("--embed does not apply to USD")
-        skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, voice=voice)
-        return errors.DONE
-    if clip is not None or fps is not None:
-        raise UsageError(f"{'--fps' if clip is None else '--clip'} applies to USD only (.usdz, .usdc, .usda)")
 
     def edit(input: str, output: str) -> None:
+        if _is_usd(output):
+            from cli.workflows import skinned_usd  # its skinning takes long to import
+
+            if embed:
+                raise UsageError("--embed does not apply to USD")
+            skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, voice=voice)
+            return
+        if clip is not None or fps is not None:
+            raise UsageError(f"{'--fps' if clip is None else '--clip'} applies to USD only (.usdz, .usdc, .usda)")
         _convert(input, output, embed=embed, dry_run=dry_run, voice=voice)
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run, check=_check_extension)
+
+
+def _is_usd(path: str) -> bool:
+    return PurePath(path).suffix.lower() in USD_SUFFIXES
+
+
+def _check_extension(path: str) -> None:
+    if not _is_usd(path):
+        documents.check_extension(path)
 
 
 def _convert(input: str, output: str, *, embed: bool, dry_run: bool, voice: text.Reporter) -> None:

@@ -32,8 +32,12 @@ def edit_named(
     voice: Reporter,
     *,
     dry_run: bool,
+    check: Callable[[str], None] = documents.check_extension,
 ) -> int:
-    """Run `edit` on IN and OUT, or with a pattern of outputs on all named files; return the exit code."""
+    """Run `edit` on IN and OUT, or with a pattern of outputs on all named files; return the exit code.
+
+    check: raises UsageError for the extension of an output.
+    """
     if pattern is None:
         if more:
             help = "the command takes IN and OUT; for more inputs name their outputs by --out"
@@ -44,7 +48,7 @@ def edit_named(
     if not pattern:
         raise UsageError("--out has an empty name")
     names = [input, *([] if output == documents.PIPE else [output]), *more]
-    return edit_files(names, pattern, edit, voice, dry_run=dry_run)
+    return edit_files(names, pattern, edit, voice, dry_run=dry_run, check=check)
 
 
 def refuse_folder(path: str, *, help: str) -> None:
@@ -54,7 +58,13 @@ def refuse_folder(path: str, *, help: str) -> None:
 
 
 def edit_files(
-    inputs: Sequence[str], pattern: str, edit: Callable[[str, str], object], voice: Reporter, *, dry_run: bool
+    inputs: Sequence[str],
+    pattern: str,
+    edit: Callable[[str, str], object],
+    voice: Reporter,
+    *,
+    dry_run: bool,
+    check: Callable[[str], None] = documents.check_extension,
 ) -> int:
     """Run `edit` on each input and its output, in order; return the largest exit code.
 
@@ -62,7 +72,7 @@ def edit_files(
     part of its pattern, {folder}, {name} or {stem}; "out/" is "out/{path}". Errors are reported with the file's name.
     Raises UsageError, before any work, for two inputs with one output, or an output that is another input.
     """
-    pairs = plan_files(inputs, f"{pattern}{{path}}" if pattern.endswith("/") else pattern)
+    pairs = plan_files(inputs, f"{pattern}{{path}}" if pattern.endswith("/") else pattern, check)
     codes = []
     for pair in pairs:
         try:
@@ -80,7 +90,9 @@ def edit_files(
     return max(codes, default=errors.DONE)
 
 
-def plan_files(inputs: Sequence[str], pattern: str) -> list[FilePair]:
+def plan_files(
+    inputs: Sequence[str], pattern: str, check: Callable[[str], None] = documents.check_extension
+) -> list[FilePair]:
     """Return each input with its output. Files below the folder of the outputs, if a search finds them, are none."""
     output_names.check_placeholders(pattern, output_names.OF_PATHS)
     pairs: dict[str, FilePair] = {}
@@ -91,7 +103,7 @@ def plan_files(inputs: Sequence[str], pattern: str) -> list[FilePair]:
         if each.path == documents.PIPE:
             raise UsageError("stdin has no name for --out: name files")
         pair = FilePair(each.path, output_names.fill_path(pattern, os.path.relpath(each.path, each.folder)))
-        documents.check_extension(pair.output)
+        check(pair.output)
         same = pairs.setdefault(os.path.realpath(pair.output), pair)
         if same is not pair:
             problem = f"'{same.input}' and '{pair.input}' have the same output, '{pair.output}'"

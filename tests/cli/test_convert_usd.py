@@ -94,6 +94,12 @@ def test_refusals(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.usd*"))
 
 
+def test_a_folder(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    fixture("arm")
+    assert call("convert", tmp_path, "-o", f"{tmp_path}/out/{{stem}}.usdz", "--clip", "#0", "--fps", "5").code == 0
+    assert findings(tmp_path / "out" / "arm.usdz") == []
+
+
 def test_a_dry_run_writes_nothing(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     run = call("convert", fixture("arm"), tmp_path / "a.usdz", "--clip", "bend", "-n")
     assert run.code == 0
