@@ -131,14 +131,14 @@ def test_a_module_imports_only_from_below() -> None:
             assert other in LEVEL, f"{_short(path)} imports {name}, a package without a level"
             if other != package and LEVEL[other] >= LEVEL[package] and (package, other) not in NEIGHBORS:
                 wrong.append((_short(path), name))
-    assert not wrong
+    assert not wrong, "imports go from later to earlier LEVELS: move the code down, or pass the value as a parameter"
 
 
 def test_internal_modules_are_imported_by_their_own_package_only() -> None:
     used = _modules_used_outside_their_package()
     public = {f"{package}.{name}" for package, names in PUBLIC.items() for name in names.split()}
-    assert not {name: users for name, users in used.items() if name not in public}, "add it to PUBLIC, or move code"
-    assert not public - used.keys(), "PUBLIC lists what nobody imports from outside"
+    assert not {name: users for name, users in used.items() if name not in public}, "add it to PUBLIC of this file, or move code"
+    assert not public - used.keys(), "remove it from PUBLIC: no other package imports it"
 
 
 def test_the_library_neither_prints_nor_opens_files() -> None:
@@ -154,16 +154,18 @@ def test_the_library_neither_prints_nor_opens_files() -> None:
                 found |= {node.attr} & FORBIDDEN_METHODS
                 found |= {ast.unparse(node)} & FORBIDDEN_ATTRIBUTES
         wrong += [(_short(path), name) for name in sorted(found)]
-    assert not wrong
+    assert not wrong, "take bytes as a parameter, or add the module to OPENING; `cli` prints and reads options"
 
 
 def test_no_module_imports_itself_through_others() -> None:
-    assert not [_short(path) for path in MODULES if path in _reachable(path)]
+    circles = [_short(path) for path in MODULES if path in _reachable(path)]
+    assert not circles, "these import themselves through others: move what both use to a module below"
 
 
 def test_the_command_line_imports_the_library_only() -> None:
     others = {"fixtures", "tests", "click", "pygltflib", "scipy", "trimesh"}
-    assert not [(_short(p), name) for p in COMMANDS for name in _imported(p) if name.split(".")[0] in others]
+    wrong = [(_short(p), name) for p in COMMANDS for name in _imported(p) if name.split(".")[0] in others]
+    assert not wrong, "call a function of `anim` for it"
 
 
 def test_heavy_packages_are_imported_late() -> None:
@@ -175,12 +177,13 @@ def test_heavy_packages_are_imported_late() -> None:
         for name in {name for node in _tree(path).body for name in _names(node)}:
             if name.split(".")[0] in heavy or (path not in KERNELS and name.startswith(kernels)):
                 wrong.append((_short(path), name))
-    assert not wrong
+    assert not wrong, "import it inside of the function that uses it: start-up loads numpy and typer only"
 
 
 def test_the_cache_of_machine_code_knows_all_kernels() -> None:
     """A change of any kernel makes a new cache: numba doesn't check callees."""
-    assert {path.parent.relative_to(ROOT / "anim").as_posix() for path in KERNELS} == set(KERNEL_FOLDERS)
+    folders = {path.parent.relative_to(ROOT / "anim").as_posix() for path in KERNELS}
+    assert folders == set(KERNEL_FOLDERS), "KERNEL_FOLDERS of skinning/kernels/jit.py lists folders of kernels"
 
 
 def test_importing_the_library_loads_nothing_heavy() -> None:

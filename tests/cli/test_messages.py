@@ -1,4 +1,4 @@
-"""What is said when something is wrong: the exit code, one line with the right words, maybe a line of help."""
+"""Errors: the exit code, one line with the right words, maybe a line of help."""
 
 from __future__ import annotations
 

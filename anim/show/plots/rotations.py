@@ -16,7 +16,7 @@ from anim.show.plots.polylines import Polyline
 FROM_REST, COMPONENTS = "from rest", "components"  # views; the others are the twelve orders of Euler angles
 FLOAT32_GIMBAL_TOLERANCE_RAD = 1e-6  # rad from lock, below which float32 rotations can't separate first and third angle
 NEAR_LOCK_DEG = 5.0  # rates of angles are amplified 23 times there
-FULL_TURN_DEG = 360.0
+REVOLUTION_DEG = 360.0
 MAX_LINE_STEP_DEG = 3.0  # between points of a line; Euler angles race near lock, where the rotation itself does not
 MAX_REFINEMENTS = 6  # halvings of the time between two points
 
@@ -79,6 +79,6 @@ def _continuous(q: Floats) -> Floats:
         length = float(np.linalg.norm(vectors[i]))
         if length > 0:
             axis = vectors[i] / length
-            turns = np.rint((vectors[i - 1] @ axis - length) / FULL_TURN_DEG)
-            vectors[i] += turns * FULL_TURN_DEG * axis
+            revolutions = np.rint((vectors[i - 1] @ axis - length) / REVOLUTION_DEG)
+            vectors[i] += revolutions * REVOLUTION_DEG * axis
     return np.asarray(vectors)
