@@ -137,7 +137,9 @@ def test_a_module_imports_only_from_below() -> None:
 def test_internal_modules_are_imported_by_their_own_package_only() -> None:
     used = _modules_used_outside_their_package()
     public = {f"{package}.{name}" for package, names in PUBLIC.items() for name in names.split()}
-    assert not {name: users for name, users in used.items() if name not in public}, "add it to PUBLIC of this file, or move code"
+    assert not {name: users for name, users in used.items() if name not in public}, (
+        "add it to PUBLIC here, or move code"
+    )
     assert not public - used.keys(), "remove it from PUBLIC: no other package imports it"
 
 
