@@ -2,6 +2,7 @@
 
 import { Quaternion } from "three";
 import { begin, ink } from "./canvas.js";
+import { formatNumber } from "./format.js";
 import { INSET } from "./timeline.js";
 
 const SAMPLES = 320;
@@ -101,7 +102,7 @@ export class Curves {
     for (let c = 0; c < first.size; c++) {
       context.fillStyle = ink(COLORS[c % 4]);
       const name = path === "weights" ? `${c}` : AXES[c];
-      write(`${name} ${Number(values[c].toPrecision(4))}${first.unit}`);
+      write(`${name} ${formatNumber(values[c])}${first.unit}`);
     }
     context.fillStyle = ink("--dim");
     write(`${first.times.length} keys`);

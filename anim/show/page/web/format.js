@@ -1,5 +1,6 @@
 // Numbers with units.
 
+const STEPS = [1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10];
 const LENGTHS = [[1, "m", 1], [1e-2, "cm", 1e2], [1e-4, "mm", 1e3], [1e-7, "µm", 1e6], [0, "nm", 1e9]];
 
 /** "0.41 mm", "12 cm", "1.71 m". */
@@ -25,8 +26,13 @@ export function roundDown(value) {
   return [5, 2, 1].find((digit) => digit * power <= value * 1.0001) * power;
 }
 
-/** The smallest of 1, 2 and 5 times a power of ten that is at least `value`. */
+/** A round number that is at least `value`, and little more. */
 export function roundUp(value) {
   const power = 10 ** Math.floor(Math.log10(value));
-  return [1, 2, 5, 10].find((digit) => digit * power >= value * 0.9999) * power;
+  return STEPS.find((digit) => digit * power >= value * 0.9999) * power;
+}
+
+/** A value with at most `digits` significant digits and four decimals: no 1.2e-7 for what rounds to 0. */
+export function formatNumber(value, digits = 4) {
+  return String(Number(Number(value.toPrecision(digits)).toFixed(4)));
 }

@@ -13,7 +13,10 @@ export class Side {
     this.overlay = new Group(); // skeleton, onion skins: drawn above the model
     this.scene.add(this.root, this.overlay, ...lights());
     this.meshes = [];
-    this.root.traverse((object) => object.isMesh && this.meshes.push(object));
+    this.root.traverse((object) => {
+      object.name ||= object.uuid; // which clones, onion skins, find their tracks by
+      if (object.isMesh) this.meshes.push(object);
+    });
     for (const mesh of this.meshes) prepareMesh(mesh);
     this.nodes = nodesOf(gltf);
     this.mixer = new AnimationMixer(this.root);

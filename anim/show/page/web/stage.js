@@ -6,7 +6,8 @@ import { formatLength, roundDown } from "./format.js";
 import { state } from "./state.js";
 
 const FIT_TIMES = 5; // of the clip
-const MAX_FIT_VERTICES = 1500; // per mesh and time
+const MAX_FIT_VERTICES = 400; // per mesh and time
+const FILLED = 0.8; // of the view's height or width, by the model
 const MAX_PIXEL_RATIO = 2;
 const FLOOR_RADII = 6; // radius of the floor, in radii of the model
 const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from the front, a little from the left and above
@@ -35,25 +36,14 @@ export class Stage {
     return [this.sides[state.side === "a" ? 0 : 1]];
   }
 
-  /** Aim the camera at everything that moves, at some times of the clip, in the narrower direction of a view. */
+  /** Aim the camera at everything that moves, at some times of the clip, so that it fills a view. */
   fit(duration) {
-    const box = new Box3();
-    for (const side of this.sides) {
-      for (let i = 0; i < FIT_TIMES; i++) {
-        side.pose((duration * i) / (FIT_TIMES - 1));
-        for (const mesh of side.meshes) expand(box, mesh);
-        if (!side.meshes.length) {
-          for (const node of side.nodes.values()) box.expandByPoint(node.object.getWorldPosition(new Vector3()));
-        }
-      }
-    }
+    const points = this.#points(duration);
+    const box = new Box3().setFromPoints(points);
     if (box.isEmpty()) box.set(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
     const center = box.getCenter(new Vector3());
     this.radius = box.getSize(new Vector3()).length() / 2 || 1;
-    const { clientWidth, clientHeight } = this.renderer.domElement.parentNode;
-    const aspect = clientWidth / clientHeight / this.shown.length;
-    const halfAngle = Math.atan(Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, aspect));
-    const distance = (this.radius * 1.04) / Math.sin(halfAngle);
+    const distance = this.#distance(points, center);
     this.camera.near = distance / 100;
     this.camera.far = distance * 50;
     this.camera.position.copy(DIRECTION).setLength(distance).add(center);
@@ -66,6 +56,38 @@ export class Stage {
       mesh.position.set(center.x, box.min.y, center.z);
       mesh.material.uniforms.cell.value = this.cell;
     }
+  }
+
+  /** Positions of some vertices of all files, at some times; of nodes where there is no mesh. */
+  #points(duration) {
+    const points = [];
+    for (const side of this.sides) {
+      for (let i = 0; i < FIT_TIMES; i++) {
+        side.pose((duration * i) / (FIT_TIMES - 1));
+        for (const mesh of side.meshes) addVertices(points, mesh);
+        if (side.meshes.length) continue;
+        for (const node of side.nodes.values()) points.push(node.object.getWorldPosition(new Vector3()));
+      }
+    }
+    return points;
+  }
+
+  /** The least distance of the camera from which all points are inside a view, with a margin. */
+  #distance(points, center) {
+    const { clientWidth, clientHeight } = this.renderer.domElement.parentNode;
+    const aspect = clientWidth / clientHeight / this.shown.length;
+    const tangent = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
+    const toCamera = DIRECTION.clone().normalize();
+    const right = new Vector3(0, 1, 0).cross(toCamera).normalize();
+    const up = toCamera.clone().cross(right);
+    const spot = new Vector3();
+    let distance = this.radius * 0.5;
+    for (const point of points) {
+      spot.subVectors(point, center);
+      const needed = Math.max(Math.abs(spot.dot(right)) / (tangent * aspect), Math.abs(spot.dot(up)) / tangent);
+      distance = Math.max(distance, needed + spot.dot(toCamera));
+    }
+    return distance;
   }
 
   get floorLabel() {
@@ -106,12 +128,11 @@ export class Stage {
   }
 }
 
-function expand(box, mesh) {
+function addVertices(points, mesh) {
   const count = mesh.geometry.attributes.position.count;
   const step = Math.max(1, Math.floor(count / MAX_FIT_VERTICES));
-  const point = new Vector3();
   for (let i = 0; i < count; i += step) {
-    box.expandByPoint(mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld));
+    points.push(mesh.getVertexPosition(i, new Vector3()).applyMatrix4(mesh.matrixWorld));
   }
 }
 
