@@ -11,18 +11,22 @@ from typing import Annotated
 
 import typer
 
-from cli import errors
+from cli import errors, units
+from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
-from cli.text import Reporter
+from cli.text import Reporter, format_bytes, plural
 from cli.workflows.run import cache as caching
 from cli.workflows.run import journal as journals
+from cli.workflows.run import outputs
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
 from cli.workflows.run.plan import plan_jobs
+from cli.workflows.run.prune import prune
 from cli.workflows.run.recipe import chosen_recipes, read_recipes
 from cli.workflows.run.run import RecipeRun
 
+MAX_LISTED_OUTPUTS = 3  # in a note
 Script = StrEnum("Script", [(name, name) for name in SCRIPTS])  # type: ignore[misc]
 
 
@@ -54,6 +58,16 @@ def command(
         ),
     ] = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Keep no results, and use none.")] = False,
+    cache_size: Annotated[
+        str,
+        typer.Option(
+            "--cache-size", metavar="SIZE", help="Maximum size of all results; those not used for longest are deleted."
+        ),
+    ] = "5GB",
+    delete_stale: Annotated[
+        bool,
+        typer.Option("--delete-stale", help="Delete unchanged outputs of earlier runs that no recipe makes any more."),
+    ] = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the last run: what it made is not even read again.")
     ] = False,
@@ -90,18 +104,24 @@ def command(
     this tool: a second run makes nothing again. --resume continues a run that was interrupted, by its journal.
     Files that fail are named, others are done; the exit code is the largest one.
 
+    A note names outputs of earlier runs that no recipe makes any more, as after an input was deleted. --delete-stale
+    deletes them, unless they were changed since.
+
     --scheduler needs the extra `cluster`; workers see the files under the same names. Slurm and others start dask's
     workers (dask-jobqueue). --emit prints what make, ninja or a shell can run instead, in the folder of the settings.
     """
-    voice = Reporter(quiet, verbose)
+    voice, limit = Reporter(quiet, verbose), units.parse_size(cache_size, "--cache-size")
+    if delete_stale and (inputs or recipe):
+        raise UsageError("--delete-stale needs a run of all files and recipes", help="leave out FILE and --recipe")
     book = read_recipes(config)
-    planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), named=bool(recipe))
+    folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
+    record = outputs.read_outputs(folder / outputs.NAME, book.folder)
+    planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
     if emit is not None:
         readable, code = readable_jobs(planned)
         if readable:
             documents.write_text(SCRIPTS[emit.value](readable))
         return code
-    folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
     results = caching.ResultCache(folder)
     results.prepare()
     processes = jobs or os.cpu_count() or 1
@@ -110,7 +130,29 @@ def command(
         journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), resume=resume))
         run = RecipeRun(planned, journal, None if no_cache else results, voice, processes, cluster)
         code = run.run()
-    return max(code, _check(run.outputs, quiet=quiet)) if check else code
+    if not no_cache and run.counts[journals.MADE]:
+        _prune(results, limit, voice)
+    _report_stale(record, run, voice, is_all=not (inputs or recipe), delete=delete_stale)
+    written = [os.path.relpath(book.folder / each) for each in run.written]
+    return max(code, _check(written, quiet=quiet)) if check else code
+
+
+def _prune(results: caching.ResultCache, limit: int, voice: Reporter) -> None:
+    count, size = prune(results, limit)
+    if count:
+        voice.info(f"note: {plural(count, 'result')} ({format_bytes(size)}) deleted from the cache: see --cache-size")
+
+
+def _report_stale(record: outputs.OutputRecord, run: RecipeRun, voice: Reporter, *, is_all: bool, delete: bool) -> None:
+    """Name outputs that no recipe makes any more, or delete them. is_all: whether the run has all files and recipes."""
+    stale = record.find_stale([name for job in run.jobs for name in (job.input, job.output)]) if is_all else []
+    if delete:
+        outputs.delete_outputs(record.folder, stale)
+    record.save(run.written, stale if delete else ())
+    if stale:
+        names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
+        what = "deleted" if delete else "--delete-stale deletes them"
+        voice.info(f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}")
 
 
 def _check(outputs: Sequence[str], *, quiet: bool) -> int:

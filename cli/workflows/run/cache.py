@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -98,11 +99,26 @@ class ResultCache:
             path.parent.mkdir(parents=True, exist_ok=True)
         atomic.write_file(path, [data])
 
+    def mark_used(self, record: CacheRecord) -> None:
+        """Set the time of a product, by which those that were not used for longest are found."""
+        with suppress(OSError):
+            os.utime(self._object(record.product))
+
+    @property
+    def results(self) -> Path:
+        """Folder of the records."""
+        return self.folder / "results"
+
+    @property
+    def objects(self) -> Path:
+        """Folder of the products."""
+        return self.folder / "objects"
+
     def _record(self, key: str) -> Path:
-        return self.folder / "results" / key[:2] / f"{key}.json"
+        return self.results / key[:2] / f"{key}.json"
 
     def _object(self, digest: str) -> Path:
-        return self.folder / "objects" / digest[:2] / digest
+        return self.objects / digest[:2] / digest
 
 
 def recipe_key(steps: tuple[Step, ...], folder: Path, hashes: FileHashes) -> str:

@@ -43,10 +43,7 @@ def makefile(jobs: Sequence[Job]) -> str:
     for job in jobs:
         _check_images(job)
         output, *inputs = (_in_make(name) for name in (job.output, job.input, *_other_inputs(job)))
-        folder = shlex.quote(PurePosixPath(job.output).parent.as_posix())
-        command = _pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output)))
-        lines = (each.replace("$", "$$") for each in (f"@mkdir -p -- {folder}", command))
-        rules.append(f"{output}: {' '.join(inputs)}\n\t" + "\n\t".join(lines) + "\n")
+        rules.append(f"{output}: {' '.join(inputs)}\n\t" + "\n\t".join(_make_commands(job)) + "\n")
         names.append(output)
     head = [HEADER, ".DELETE_ON_ERROR:", ".PHONY: all", f"all: {' '.join(names)}\n"]
     return "\n".join(head + rules)
@@ -131,6 +128,15 @@ def _check_images(job: Job) -> None:
             f"{job.input}: its image '{outside[0]}' is another file, which commands in a pipe do not copy",
             help=f'a first step "convert {EMBED}" takes images in',
         )
+
+
+def _make_commands(job: Job) -> list[str]:
+    """Lines of a rule, with automatic variables if the names need no escapes."""
+    if re.search("[ '#:]", job.input + job.output):
+        folder = shlex.quote(PurePosixPath(job.output).parent.as_posix())
+        command = _pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output)))
+        return [each.replace("$", "$$") for each in (f"@mkdir -p -- {folder}", command)]
+    return ["@mkdir -p '$(@D)'", _pipeline(job, "'$<'", "'$@'", escape=lambda text: text.replace("$", "$$"))]
 
 
 def _in_make(name: str) -> str:

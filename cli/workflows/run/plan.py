@@ -12,14 +12,18 @@ from cli.errors import UsageError
 from cli.io import input_files
 from cli.workflows.check_config import matches
 from cli.workflows.run.job import Job
+from cli.workflows.run.outputs import OutputRecord
 from cli.workflows.run.recipe import Recipe, RecipeBook
 from cli.workflows.run.steps import EDITING
 
 
-def plan_jobs(book: RecipeBook, recipes: Sequence[Recipe], files: Sequence[str], *, named: bool) -> list[Job]:
+def plan_jobs(
+    book: RecipeBook, recipes: Sequence[Recipe], files: Sequence[str], earlier: OutputRecord, *, named: bool
+) -> list[Job]:
     """Return a job for each file and recipe that matches it; for the same output the first recipe counts.
 
     files: paths, folders and patterns, from the working folder; empty for all files below the folder of the settings.
+    earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
     named: whether the recipes are named by the command line: then files need not match.
     Outputs are never inputs. Raises UsageError for two files with one output, and NotFoundError without any file.
     """
@@ -28,6 +32,8 @@ def plan_jobs(book: RecipeBook, recipes: Sequence[Recipe], files: Sequence[str],
     for recipe in recipes:
         for path in given or _files(book, recipe):
             if not (named and given) and not matches(path, recipe.match):
+                continue
+            if not given and earlier.is_product(path, book.recipes):
                 continue
             job = Job(book.folder, path, recipe.output_of(path), recipe.steps)
             same = jobs.setdefault(job.output, job)

@@ -38,7 +38,7 @@ class RecipeRun:
     """A run of jobs.
 
     cache: None to keep no results. processes: of this machine. cluster: its workers instead of these.
-    outputs: paths of those that are complete. code: the largest exit code.
+    written: input by output, of those that are complete, from the folder of the settings. code: the largest exit code.
     """
 
     jobs: Sequence[Job]
@@ -47,7 +47,7 @@ class RecipeRun:
     voice: Reporter
     processes: int
     cluster: Cluster | None = None
-    outputs: list[str] = field(default_factory=list)
+    written: dict[str, str] = field(default_factory=dict)
     counts: Counter[str] = field(default_factory=Counter)
     code: int = errors.DONE
     _hashes: FileHashes = field(default_factory=FileHashes)
@@ -119,6 +119,7 @@ class RecipeRun:
         record = cache.find(job.key, job.folder, self._hashes)
         if record is None:
             return None
+        cache.mark_used(record)
         stamp = stamp_of(job.folder / job.input)
         output = os.path.join(job.folder, job.output)
         if record.is_plain and not is_text(output) and self._hashes.hash(output) == record.product:
@@ -148,7 +149,7 @@ class RecipeRun:
     def _record(self, job: Job, result: JobResult, status: str) -> None:
         self.counts[status] += 1
         if status != FAILED:
-            self.outputs.append(os.path.relpath(job.folder / job.output))
+            self.written[job.output] = job.input
         self.code = max(self.code, result.code)
         self._progress.close()
         self._report(job, result, status)

@@ -1,0 +1,103 @@
+"""Outputs of earlier runs: those that no recipe makes any more, as after an input was deleted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anim.errors import AnimError, not_written
+from anim.files import atomic
+from anim.gltf.io.source import buffer_files, open_file
+from cli.workflows.check_config import matches
+from cli.workflows.run.job import is_text
+from cli.workflows.run.recipe import Recipe
+from cli.workflows.run.stamps import Stamp, stamp_of
+
+NAME = "outputs.json"  # in the folder of the cache
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class OutputRecord:
+    """Outputs that runs of one folder of settings have written. path: of the record, shared by several such folders.
+
+    outputs: input, and size and modification time, by output. One that was changed since is no longer theirs.
+    """
+
+    path: Path
+    folder: Path
+    outputs: Mapping[str, tuple[str, Stamp]]
+
+    def is_unchanged(self, name: str) -> bool:
+        """Return whether a file is an output as it was written."""
+        return name in self.outputs and stamp_of(self.folder / name) == self.outputs[name][1]
+
+    def is_product(self, name: str, recipes: Iterable[Recipe]) -> bool:
+        """Return whether a file is an unchanged output of recipes, from an input that may be deleted by now."""
+        if not self.is_unchanged(name):
+            return False
+        source = self.outputs[name][0]
+        return any(matches(source, each.match) and each.output_of(source) == name for each in recipes)
+
+    def find_stale(self, used: Collection[str]) -> list[str]:
+        """Return the unchanged outputs that are not used, sorted. used: inputs and outputs of all recipes."""
+        return sorted(filter(self.is_unchanged, self.outputs.keys() - set(used)))
+
+    def save(self, written: Mapping[str, str], forgotten: Collection[str] = ()) -> None:
+        """Add outputs, each with its input, to the record, and remove some. Raises OutputError."""
+        stamps = ((name, source, stamp_of(self.folder / name)) for name, source in written.items())
+        new = {name: (source, stamp) for name, source, stamp in stamps if stamp is not None}
+        kept = {name: each for name, each in sorted({**self.outputs, **new}.items()) if name not in forgotten}
+        if kept != self.outputs:
+            folders = {**_read(self.path), str(self.folder): kept}
+            text = json.dumps({"schema": SCHEMA, "folders": folders}) + "\n"
+            atomic.write_file(self.path, [np.frombuffer(text.encode(), np.uint8)])
+
+
+def read_outputs(path: Path, folder: Path) -> OutputRecord:
+    """Return the record of a folder of settings; an empty one without a readable file."""
+    outputs: dict[str, tuple[str, Stamp]] = {}
+    with suppress(ValueError, TypeError, AttributeError):
+        known = _read(path).get(str(folder), {}).items()
+        outputs = {name: (str(source), (int(size), int(time))) for name, (source, (size, time)) in known}
+    return OutputRecord(path, folder, outputs)
+
+
+def delete_outputs(folder: Path, names: Iterable[str]) -> None:
+    """Delete outputs, with buffers of .gltf files beside them, and folders that become empty. Raises OutputError."""
+    for name in names:
+        path = folder / name
+        try:
+            for each in (*_buffers(path), path):
+                each.unlink(missing_ok=True)
+        except OSError as error:
+            raise not_written(name, error) from None
+        with suppress(OSError):  # not empty
+            for above in path.relative_to(folder).parents[:-1]:
+                (folder / above).rmdir()
+
+
+def _buffers(path: Path) -> list[Path]:
+    """Buffers of a .gltf that have its name."""
+    if not is_text(path.name):
+        return []
+    try:
+        files = [Path(each) for each in buffer_files(open_file(str(path)))]
+    except AnimError:
+        return []
+    return [each for each in files if each.parent == path.parent.resolve() and each.stem == path.stem]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
+    except (OSError, ValueError):
+        return {}
+    folders = value.get("folders") if isinstance(value, dict) else None
+    return folders if isinstance(folders, dict) else {}

@@ -1,0 +1,99 @@
+"""Outputs of deleted inputs, and the size of the cache."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from tests.cli.running import help_line, refusal
+from tests.cli.running_recipes import statuses, write_crowd, write_recipe
+
+PLAIN = ("resample --fps 12",)
+
+
+def outputs(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in (folder / "build").rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def made(folder: Path, call: Call) -> Path:
+    """A folder with a run of two files, of which one input is deleted after it."""
+    write_crowd(folder, hero="biped", cube="morph_cube")
+    (folder / "crowd/arm 1.glb").unlink()
+    write_recipe(folder, *PLAIN)
+    call("run").product()
+    (folder / "crowd/cube.glb").unlink()
+    return folder
+
+
+def test_outputs_of_deleted_inputs_are_named_and_deleted(made: Path, call: Call) -> None:
+    note = "note: no recipe makes 1 output of earlier runs any more (build/crowd/cube.glb): "
+    for _ in range(2):
+        assert f"{note}--delete-stale deletes them\n" in call("run").err
+    assert outputs(made) == {"build/crowd/hero.glb", "build/crowd/cube.glb"}
+    assert f"{note}deleted\n" in call("run", "--delete-stale").err
+    assert outputs(made) == {"build/crowd/hero.glb"}
+    assert "note" not in call("run", "--delete-stale").err
+
+
+def test_only_unchanged_outputs_of_earlier_runs_are_deleted(made: Path, call: Call) -> None:
+    (made / "build/crowd/cube.glb").write_bytes(b"other")
+    (made / "build/notes.glb").write_bytes(b"mine")
+    call("run", "--delete-stale")
+    assert outputs(made) == {"build/crowd/hero.glb", "build/crowd/cube.glb", "build/notes.glb"}
+
+
+def test_a_run_of_some_files_deletes_nothing(made: Path, call: Call) -> None:
+    assert "note" not in call("run", "crowd/hero.glb").err
+    run = call("run", "crowd/hero.glb", "--delete-stale")
+    assert "--delete-stale needs a run of all files and recipes" in refusal(run, 2)
+    assert help_line(run) == "leave out FILE and --recipe"
+    assert "build/crowd/cube.glb" in call("run").err
+
+
+def test_buffers_and_empty_folders_are_deleted_too(made: Path, call: Call) -> None:
+    write_crowd(made, cube="morph_cube")
+    (made / "gltf-anim.toml").unlink()
+    write_recipe(made, *PLAIN, out="build/{stem}/{stem}.gltf")
+    assert "no recipe makes 2 outputs" in call("run", "--delete-stale").err
+    assert outputs(made) == {f"build/{name}/{name}.{end}" for name in ("hero", "cube") for end in ("gltf", "bin")}
+    (made / "crowd/cube.glb").unlink()
+    call("run", "--delete-stale")
+    assert [path.name for path in (made / "build").iterdir()] == ["hero"]
+
+
+def test_outputs_beside_their_inputs_are_no_inputs_when_these_are_deleted(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped", cube="morph_cube")
+    (folder / "crowd/arm 1.glb").unlink()
+    write_recipe(folder, *PLAIN, match="crowd/*.glb", out="crowd/{stem}-small.glb")
+    call("run").product()
+    (folder / "crowd/cube.glb").unlink()
+    assert "(crowd/cube-small.glb)" in call("run").err
+    assert statuses(folder).keys() == {"crowd/hero.glb"}
+    (folder / "gltf-anim.toml").unlink()  # another recipe may have them as inputs
+    write_recipe(folder, *PLAIN, match="crowd/*-small.glb")
+    assert "note" not in call("run", "--delete-stale").err
+    assert outputs(folder) == {"build/crowd/hero-small.glb", "build/crowd/cube-small.glb"}
+
+
+def test_results_that_were_not_used_for_longest_leave_the_cache(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped", cube="morph_cube")
+    write_recipe(folder, *PLAIN)
+    call("run", "crowd/hero.glb").product()
+    call("run", "crowd/cube.glb").product()
+    call("run", "crowd/hero.glb").product()  # used last
+    kept = sum(
+        len(call("resample", f"crowd/{name}.glb", *PLAIN[0].split()[1:]).product()) for name in ("hero", "arm 1")
+    )
+    run = call("run", "crowd/arm 1.glb", "--cache-size", str(kept))
+    assert "note: 1 result (" in run.err
+    assert "deleted from the cache: see --cache-size" in run.err
+    shutil.rmtree(folder / "build")
+    call("run").product()
+    assert statuses(folder) == {"crowd/arm 1.glb": "cached", "crowd/cube.glb": "made", "crowd/hero.glb": "cached"}
+    objects = [path for path in (folder / ".gltf-anim-cache/objects").rglob("*") if path.is_file()]
+    records = [path for path in (folder / ".gltf-anim-cache/results").rglob("*") if path.is_file()]
+    assert len(objects) == len(records) == 3
