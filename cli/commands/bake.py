@@ -14,7 +14,7 @@ from anim.caches.transforms import vertex_order as orders
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
 from anim.operations.selection import Selection
-from anim.skinning.analysis.inbetween_error import InbetweenError, inbetween_error
+from anim.skinning.analysis.inbetween_error import InbetweenError, InbetweenMetric
 from anim.skinning.analysis.method_deviation import Deviation, MeasuredBake, linear_baker
 from anim.skinning.bake import SPACES, Baker, bakeable_instances
 from anim.skinning.uneven import UnevenScale
@@ -155,6 +155,7 @@ def command(
             bake_notes.left_out_note(scene, nodes, voice)
         missed: list[tuple[str, InbetweenError]] = []
         made: dict[int, Baker] = {}
+        metrics: dict[int, InbetweenMetric] = {}
         linear: Baker | None = None
         scales: UnevenScale | None = None
         deviations: list[tuple[str, Deviation]] = []
@@ -162,6 +163,7 @@ def command(
         for job in jobs:
             if job.group not in made:
                 made = {job.group: options.baker(scene, groups[job.group][1])}
+                metrics = {job.group: InbetweenMetric(made[job.group])}
                 if method is not LBS:
                     linear = linear_baker(made[job.group], space=space.value)
                     scales = UnevenScale(made[job.group])
@@ -169,7 +171,7 @@ def command(
             times, label = options.times(each), reader.clip_label(each.name, job.clip or 0)
             if scales is not None:
                 uneven.update(scales.joints(each, times))
-            missed.append((label, inbetween_error(made[job.group], each, times)))
+            missed.append((label, metrics[job.group].largest_error(each, times)))
             progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
             measured = None if linear is None else MeasuredBake(made[job.group], linear, each, times, progress)
             baked = made[job.group].bake(each, times=times, progress=progress) if measured is None else measured.cache

@@ -1,23 +1,25 @@
 """Inter-frame error of a bake: distance between the motion and linear interpolation of frames.
 
-Joints rotate between keys, and their vertices follow arcs: frames at keys far apart cut these short.
+Joints rotate between keys, and their vertices follow arcs, which chords cut short; a key between two frames is lost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.model import Clip
-from anim.skinning.bake import Baker
+from anim.skinning.analysis.extreme_vertices import reduce_scene
+from anim.skinning.bake import Baker, prepare_bake
 
-DENSE_INTERVAL_S = 0.05  # in intervals up to this the error is largest about half-way, or at a jump
-MAX_INTERVALS = 16  # the widest intervals only
-EQUAL_TOLERANCE = 0.01  # of the width of intervals, as a fraction
-NUM_PARTS = 8  # samples per interval: an eased motion has no error half-way, but elsewhere
+MAX_SEGMENTS = 50_000  # sampled on a few vertices
+MAX_INTERVALS = 4  # sampled on all vertices
+BLOCK_SEGMENTS = 512  # at once
+COARSE_PARTS = (0.25, 0.5, 0.75)  # of a segment: an eased motion has no error half-way, but elsewhere
+NUM_PARTS = 8  # of a segment, on all vertices
 
 
 class InbetweenError(NamedTuple):
@@ -27,51 +29,96 @@ class InbetweenError(NamedTuple):
     time: float
 
 
-def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
-    """Return the largest inter-frame error between frames at `times` (F,) s, increasing.
+@dataclass(frozen=True, slots=True)
+class _Segments:
+    """Spans without a key or frame inside: (n,) start and end in s, and the index of the frame before each."""
 
-    Sampled in the widest intervals, at the ends of seven eighths of each, and just before its end, where a STEP track
-    has its full error; short intervals half-way and there. Of equal intervals some are sampled, evenly over the clip.
-    Elsewhere the error may be more.
-    """
-    gaps = np.diff(times)
-    chosen = _widest(gaps)
-    is_dense = gaps[chosen] <= DENSE_INTERVAL_S
-    wide = _sampled_error(baker, clip, times, chosen[~is_dense], range(1, NUM_PARTS + 1))
-    return max(wide, _sampled_error(baker, clip, times, chosen[is_dense], (NUM_PARTS // 2, NUM_PARTS)))
+    start: Floats
+    end: Floats
+    frame: Ints
 
+    def at(self, part: float) -> Floats:
+        """Times (n,) at a fraction of each segment; at 1 just before its end, where a STEP track has its full error."""
+        if part == 1:
+            return np.nextafter(self.end, self.start)
+        return self.start + (self.end - self.start) * part
 
-def _widest(gaps: Floats) -> Ints:
-    """Indices of the widest intervals; of those about as wide as the last one, some that are evenly distributed."""
-    if len(gaps) <= MAX_INTERVALS:
-        return np.arange(len(gaps))
-    limit = np.sort(gaps)[-MAX_INTERVALS]
-    is_wider = gaps > limit * (1 + EQUAL_TOLERANCE)
-    equal = np.flatnonzero(~is_wider & (gaps >= limit * (1 - EQUAL_TOLERANCE)))
-    count = min(len(equal), MAX_INTERVALS - int(is_wider.sum()))
-    some = equal[np.linspace(0, len(equal) - 1, count).round().astype(int)]
-    return np.sort(np.concatenate((np.flatnonzero(is_wider), some)))
+    def select(self, chosen: Ints | slice) -> _Segments:
+        return _Segments(self.start[chosen], self.end[chosen], self.frame[chosen])
 
 
-def _sampled_error(baker: Baker, clip: Clip, times: Floats, chosen: Ints, parts: Sequence[int]) -> InbetweenError:
-    """Largest error in the chosen intervals, at the ends of these parts of each."""
-    most = InbetweenError(0.0, 0.0)
-    if not len(chosen):
-        return most
-    before, after = times[chosen], times[chosen + 1]
-    for part in parts:
-        at = np.nextafter(after, before) if part == NUM_PARTS else before + (after - before) * (part / NUM_PARTS)
-        most = max(most, _error_at(baker, clip, (before, at, after), part / NUM_PARTS))
-    return most
+class InbetweenMetric:
+    """Inter-frame errors of the bakes of one baker."""
+
+    def __init__(self, baker: Baker) -> None:
+        self._baker = baker
+        nodes = frozenset(each.instance.node for each in baker.layers)
+        space = "mesh" if baker.layers[0].in_mesh_space else "world"
+        self._reduced = prepare_bake(reduce_scene(baker.scene, nodes), space=space, rigid=True, threads=baker.threads)
+
+    def largest_error(self, clip: Clip, times: Floats) -> InbetweenError:
+        """Return the largest inter-frame error found between frames at `times` (F,) s, increasing.
+
+        Segments between frames and keys are sampled in quarters, at keys and just before them, on the extreme vertices
+        of each joint; the intervals with the largest errors again in eighths, on all vertices. Elsewhere it may be
+        larger.
+        """
+        segments = _segments(clip, times)
+        errors = _coarse_errors(self._reduced, clip, times, segments)
+        chosen = _largest_per_interval(errors, segments.frame)
+        found = [_error_in(self._baker, clip, times, segments.select(slice(each, each + 1))) for each in chosen]
+        return max(found, default=InbetweenError(0.0, 0.0))
 
 
-def _error_at(baker: Baker, clip: Clip, times: tuple[Floats, Floats, Floats], u: float) -> InbetweenError:
-    """The error at the second of three times, at fraction `u` from the first to the third."""
-    most = InbetweenError(0.0, 0.0)
-    three = (baker.bake(clip, times=each).chunks() for each in times)
-    for low, here, high in zip(*three, strict=True):
-        error = here.positions - (low.positions * (1 - u) + high.positions * u)
-        squared = np.einsum("fvi,fvi->fv", error, error).max(axis=1)
-        frame = int(squared.argmax())
-        most = max(most, InbetweenError(float(np.sqrt(squared[frame])), float(times[1][here.first + frame])))
-    return most
+def _segments(clip: Clip, times: Floats) -> _Segments:
+    """All segments; of too many some that are evenly distributed."""
+    keys = clip.key_times if clip.tracks else np.empty(0)
+    inside = keys[(keys > times[0]) & (keys < times[-1])]
+    knots = np.union1d(times, inside)
+    frame = np.searchsorted(times, knots[:-1], side="right") - 1
+    segments = _Segments(knots[:-1], knots[1:], frame)
+    if len(frame) <= MAX_SEGMENTS:
+        return segments
+    return segments.select(np.linspace(0, len(frame) - 1, MAX_SEGMENTS).round().astype(int))
+
+
+def _coarse_errors(reduced: Baker, clip: Clip, times: Floats, segments: _Segments) -> Floats:
+    """The largest error (n,) m of a few vertices in each segment."""
+    found = np.zeros(len(segments.frame))
+    for first in range(0, len(found), BLOCK_SEGMENTS):
+        block = slice(first, first + BLOCK_SEGMENTS)
+        here = segments.select(block)
+        before, after = times[here.frame], times[here.frame + 1]
+        samples = [here.at(part) for part in (0.0, *COARSE_PARTS, 1.0)]
+        seconds = np.unique(np.concatenate((before, after, *samples)))
+        frames = reduced.bake(clip, times=seconds).load_all().positions
+        low, high = frames[np.searchsorted(seconds, before)], frames[np.searchsorted(seconds, after)]
+        for at in samples:
+            u = ((at - before) / (after - before))[:, None, None]
+            error = frames[np.searchsorted(seconds, at)] - (low * (1 - u) + high * u)
+            found[block] = np.maximum(found[block], np.sqrt(np.einsum("fvi,fvi->fv", error, error).max(axis=1)))
+    return found
+
+
+def _largest_per_interval(errors: Floats, frame: Ints) -> list[int]:
+    """Indices of the worst segments of the intervals with the largest errors."""
+    seen: dict[int, int] = {}
+    for index in np.argsort(-errors, kind="stable").tolist():
+        seen.setdefault(int(frame[index]), index)
+        if len(seen) == MAX_INTERVALS:
+            break
+    return list(seen.values())
+
+
+def _error_in(baker: Baker, clip: Clip, times: Floats, segment: _Segments) -> InbetweenError:
+    """The largest error in one segment, on all vertices."""
+    frame = int(segment.frame[0])
+    before, after = times[frame], times[frame + 1]
+    at = np.unique([segment.at(part / NUM_PARTS)[0] for part in range(NUM_PARTS + 1)])
+    seconds = np.unique([before, after, *at])
+    frames = baker.bake(clip, times=seconds).load_all().positions
+    u = ((at - before) / (after - before))[:, None, None]
+    error = frames[np.searchsorted(seconds, at)] - (frames[0] * (1 - u) + frames[-1] * u)
+    squared = np.einsum("fvi,fvi->fv", error, error).max(axis=1)
+    worst = int(squared.argmax())
+    return InbetweenError(float(np.sqrt(squared[worst])), float(at[worst]))

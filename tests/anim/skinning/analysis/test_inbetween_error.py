@@ -7,15 +7,21 @@ import itertools
 import numpy as np
 import pytest
 
+from anim.arrays import Floats
 from anim.model import Clip, Mesh, MeshInstance, Scene
 from anim.sampling.times import frame_times
-from anim.skinning.analysis.inbetween_error import MAX_INTERVALS, inbetween_error
+from anim.skinning.analysis.extreme_vertices import extreme_vertices
+from anim.skinning.analysis.inbetween_error import InbetweenError, InbetweenMetric
 from anim.skinning.bake import Baker, prepare_bake
 from tests.anim.skinning.methods.test_linear_blend import moving
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import CUBICSPLINE, STEP, clip, skeleton, track
 
 POINTS = np.array([[2.0, 0, 0], [0, 0.5, 0], [0, 0, 9]])
+
+
+def inbetween_error(baker: Baker, clip: Clip, times: Floats) -> InbetweenError:
+    return InbetweenMetric(baker).largest_error(clip, times)
 
 
 def _rigid() -> Baker:
@@ -67,7 +73,7 @@ def test_the_widest_gaps_are_looked_into() -> None:
     """Many gaps, of which one is twice as wide; against every middle of the whole, as one bake."""
     of = random_scene(3)
     played, made = moving(of, 5), prepare_bake(of)
-    times = np.delete(np.linspace(0, 8, 4 * MAX_INTERVALS), 30)
+    times = np.delete(np.linspace(0, 8, 64), 30)
     found = inbetween_error(made, played, times)
     middles = (times[1:] + times[:-1]) / 2
     frames = made.bake(played, times=times).load_all().positions
@@ -75,3 +81,44 @@ def test_the_widest_gaps_are_looked_into() -> None:
     wanted = np.linalg.norm(half[0] - (frames[29] + frames[30]) / 2, axis=1).max()
     assert found.distance >= wanted - 1e-6
     assert any(low <= found.time <= high for low, high in itertools.pairwise(times))
+
+
+def test_one_key_between_two_frames_is_found() -> None:
+    """A hit of one key among 600, between two frames; and of a STEP track."""
+    times = np.arange(601) / 60
+    degrees = 10 * np.sin(2 * times)
+    degrees[305] += 60
+    frames = frame_times(0, 10, fps=30)
+    found = inbetween_error(_rigid(), _turning(times.tolist(), degrees.tolist()), frames)
+    assert found.time == pytest.approx(305 / 60)
+    assert found.distance == pytest.approx(4 * np.sin(np.radians(30)), rel=0.01)
+    values = np.zeros((601, 3))
+    values[305] = [0, 3, 4]
+    stepped = inbetween_error(_rigid(), clip(track("translation", times.tolist(), values, STEP)), frames)
+    assert stepped.distance == pytest.approx(5)
+
+
+def test_few_vertices_have_nearly_the_error_of_all() -> None:
+    """On random meshes with skins and targets: every interval, all vertices, at the same times."""
+    scene = random_scene(3)
+    played, made = moving(scene, 5), prepare_bake(scene)
+    times = np.linspace(0, 8, 20)
+    dense = np.unique(np.concatenate([times, *(times[:-1] + np.diff(times) * part for part in np.linspace(0, 1, 33))]))
+    every = made.bake(played, times=dense).load_all().positions
+    frames = every[np.searchsorted(dense, times)]
+    at = np.clip(np.searchsorted(times, dense, side="right") - 1, 0, len(times) - 2)
+    u = ((dense - times[at]) / np.diff(times)[at])[:, None, None]
+    wanted = np.linalg.norm(every - (frames[at] * (1 - u) + frames[at + 1] * u), axis=2).max()
+    assert 0.97 * wanted <= inbetween_error(made, played, times).distance <= 1.03 * wanted
+
+
+def test_vertices_at_the_ends_of_each_joint_are_chosen() -> None:
+    points = np.random.default_rng(1).normal(size=(400, 3))
+    joints, weights = np.repeat([[0, 1], [1, 0]], 200, axis=0), np.tile([0.75, 0.25], (400, 1))
+    targets = np.zeros((1, 400, 3))
+    targets[0, 77] = [0, 1, 0]
+    mesh = Mesh("mesh", points, np.empty((0, 3), np.int64), joints, weights, targets, np.zeros(1))
+    chosen = extreme_vertices(mesh).tolist()
+    wanted = {77} | {int(first + points[first : first + 200, axis].argmax()) for first in (0, 200) for axis in range(3)}
+    wanted |= {int(first + points[first : first + 200, axis].argmin()) for first in (0, 200) for axis in range(3)}
+    assert set(chosen) == wanted
