@@ -61,6 +61,8 @@ def find_constants(context: Context, clips: Sequence[Clip]) -> Constants:
             if distance > bound:
                 moved.add(target)
                 unit = meters[PATHS.index(track.path)][track.node]
+                if unit * _difference(track, track.values[0]) > 2 * bound:  # too far apart for any constant
+                    continue
                 _count_constant(values.setdefault(target, []), track, unit, bound)
     chosen = {
         target: tuple(each.value for each in sorted(found, key=lambda each: -each.clips))

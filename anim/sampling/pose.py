@@ -78,8 +78,8 @@ class PoseSampler:
             if batch.path == "weights":
                 weights.update((node, _repeated(values[:, i], frames)) for i, node in enumerate(numbers))
                 continue
-            part = parts[batch.path]
-            part.reshape(len(samples) // len(used), len(values), *part.shape[1:])[:, :, numbers] = values
+            for first in range(0, frames, max(len(values), 1)):
+                parts[batch.path][first : first + len(values), numbers] = values
         times = at if len(samples) == 1 else _repeated(at, frames)
         return Pose(times, parts["translation"], parts["rotation"], parts["scale"], weights)
 
@@ -174,4 +174,5 @@ def _repeated(values: Floats, frames: int) -> Floats:
 
 
 def _rest_values(values: Floats, frames: int) -> Floats:
-    return np.repeat(values[None], frames, axis=0)
+    """Values (F, N, C), in memory node by node, the order of matrices."""
+    return np.swapaxes(np.repeat(values[:, None], frames, axis=1), 0, 1)

@@ -106,19 +106,30 @@ class _Search:
             if self._best is before:
                 break
 
-    def _attempt(self, plan: Plan) -> TrialResult:
+    def _attempt(self, plan: Plan) -> None:
+        """Try a plan; it is measured only if it takes fewer bytes than the best."""
+        limit = math.inf if self._best is None else self._best.size
+        outcome = self._runner.run_smaller(plan, limit)
+        if outcome is not None:
+            self._keep_smaller(outcome)
+
+    def _measure(self, plan: Plan) -> TrialResult:
+        """Try a plan, and return its result."""
         limit = math.inf if self._best is None else self._best.size
         outcome = self._runner.run(plan, smaller_than=limit)
+        self._keep_smaller(outcome)
+        return outcome
+
+    def _keep_smaller(self, outcome: TrialResult) -> None:
         if outcome.worst <= 1 and (self._best is None or outcome.size < self._best.size):
             self._best = outcome
-        return outcome
 
     def _adapt(self, plan: Plan, rounds: int) -> None:
         """Try a plan, adjust each budget by the usage of the points it moves, and repeat."""
-        for number in range(rounds):
-            outcome = self._attempt(plan)
-            if number + 1 < rounds:
-                plan = replace(plan, budgets=self._next_budgets(plan.budgets, outcome))
+        for _ in range(rounds - 1):
+            plan = replace(plan, budgets=self._next_budgets(plan.budgets, self._measure(plan)))
+        if rounds:
+            self._attempt(plan)
 
     def _next_budgets(self, budgets: Floats, outcome: TrialResult) -> Floats:
         answering = self._runner.source.answering

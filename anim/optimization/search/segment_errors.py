@@ -29,10 +29,13 @@ class SegmentErrors:
         # errors[e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
         self._errors = np.full((count, tracks, span), np.inf, np.float32)
         bent = np.arange(tracks)
+        components = np.ascontiguousarray(np.moveaxis(values, -1, 0))
         for n in range(span):
-            error = _segment_error(values[bent], times, n + 1)
+            error = _segment_error(components, times, n + 1)
             self._errors[n + 1 :, bent, n] = error.T
-            bent = bent[(error <= limit).any(axis=1)]  # longer segments of the others nearly all exceed it too
+            kept = (error <= limit).any(axis=1)  # longer segments of the others nearly all exceed it too
+            if not kept.all():
+                bent, components = bent[kept], components[:, kept]
 
     def greedy_keys(self, tracks: Ints, budgets: Floats) -> Bools:
         """Return the keys (k, K) of the `tracks` (k,) so that no segment's error exceeds the budget (k,) in m."""
@@ -59,15 +62,19 @@ def _span(times: Floats) -> int:
 
 
 def _segment_error(values: Floats, times: Floats, length: int) -> Floats:
-    """Errors of segments over `length` intervals (G, K - length), 0 for neighbors."""
-    starts = values.shape[1] - length
-    largest = np.zeros((len(values), starts))
-    a, b = values[:, :starts], values[:, length:]
+    """Errors of segments over `length` intervals (G, K - length), 0 for neighbors; values: (C, G, K)."""
+    starts = values.shape[2] - length
+    largest = np.zeros((values.shape[1], starts))
+    a = values[..., :starts]
+    change = values[..., length:] - a
     whole = times[length:] - times[:starts]
+    error = np.empty_like(a)
     for inner in range(1, length):
-        fraction = ((times[inner : inner + starts] - times[:starts]) / whole)[:, None]
-        error = a + fraction * (b - a) - values[:, inner : inner + starts]
-        np.maximum(largest, np.einsum("gkc,gkc->gk", error, error), out=largest)
+        np.multiply((times[inner : inner + starts] - times[:starts]) / whole, change, out=error)
+        error += a
+        error -= values[..., inner : inner + starts]
+        error *= error
+        np.maximum(largest, error.sum(axis=0), out=largest)
     return np.asarray(np.sqrt(largest))
 
 

@@ -58,7 +58,7 @@ class TrialRunner:
         self._from_rest = np.array([each.from_rest for each in source.moving])
         self._from_middle = np.array([each.from_middle for each in source.moving])
         self._rest = [_rest(source, path) for path in PATHS]
-        self._shared = [_constant_errors(each, values) for each, values in zip(source.moving, shared, strict=True)]
+        self._constants = [_constant_errors(each, values) for each, values in zip(source.moving, shared, strict=True)]
         self._layouts = TimeAxisSearch(source, coding, self._bound)
         self._candidates = Candidates(source, coding.packing)
         self._compensation = ParentCompensation(skeleton, source, self._candidates)
@@ -69,6 +69,12 @@ class TrialRunner:
         Component-wise interpolation is measured only if the result is otherwise within the bounds and has fewer bytes
         than `smaller_than`.
         """
+        outcome = self.run_smaller(plan, math.inf, smaller_than=smaller_than)
+        assert outcome is not None
+        return outcome
+
+    def run_smaller(self, plan: Plan, limit: float, *, smaller_than: float = math.inf) -> TrialResult | None:
+        """Return the same; None, without a measurement, for a result with `limit` or more bytes."""
         actions = self._actions(plan)
         shown = [part.copy() for part in self.source.local]
         keys = self._single_key(actions, plan, shown)
@@ -81,6 +87,8 @@ class TrialRunner:
             shown[self._paths[i]][self._nodes[i]] = candidate.shown
         on = {i: axis.keys for axis in axes for i in axis.members}
         size = self._size(actions, keys, axes)
+        if size >= limit:
+            return None
         usage = self._usage
         outcome = TrialResult(plan, actions, keys, on, usage.slerp_raw(shown), usage.own(shown), size)
         if outcome.worst > 1 or size >= smaller_than or not self._chords_matter(axes, keys):
@@ -117,20 +125,19 @@ class TrialRunner:
             gone = np.flatnonzero((actions == TrackAction.DROPPED) & (self._paths == path))
             shown[path][self._nodes[gone]] = rest[gone][:, None]
         keys = {}
-        for i in np.flatnonzero(actions == TrackAction.CONSTANT).tolist():
-            keys[i] = quantization.constant_cost(
-                self._constant_value(i, max(CONSTANT_BUDGET_FACTOR * plan.budgets[i], plan.threshold))
-            )
+        constant = np.flatnonzero(actions == TrackAction.CONSTANT)
+        allowances = np.maximum(CONSTANT_BUDGET_FACTOR * plan.budgets[constant], plan.threshold)
+        for i, allowance in zip(constant.tolist(), allowances.tolist(), strict=True):
+            keys[i] = self._constant(i, allowance)
             shown[self._paths[i]][self._nodes[i]] = keys[i].values[0]
         return keys
 
-    def _constant_value(self, i: int, allowance: float) -> Floats:
-        """The value of a constant track: that of other clips, else the rest value, else the middle."""
-        each = self.source.moving[i]
-        for value, error in self._shared[i]:
+    def _constant(self, i: int, allowance: float) -> EncodedKeys:
+        """The key of a constant track: the value of other clips, else the rest value, else the middle."""
+        for stored, error in self._constants[i]:
             if error <= allowance:
-                return value
-        return each.rest if each.from_rest <= allowance else each.middle
+                return stored
+        return self._constants[i][-1][0]
 
     def _chords_matter(self, axes: list[SharedAxis], keys: dict[int, EncodedKeys]) -> bool:
         for axis in axes:
@@ -168,14 +175,17 @@ def _rest(source: SourceMotion, path: str) -> Floats:
     return np.array([each.rest if each.path == path else np.zeros(width) for each in source.moving]).reshape(-1, width)
 
 
-def _constant_errors(track: SourceTrack, values: Sequence[Floats]) -> list[tuple[Floats, float]]:
-    """Each value with the track's largest distance from it, in metres."""
+def _constant_errors(track: SourceTrack, values: Sequence[Floats]) -> list[tuple[EncodedKeys, float]]:
+    """Each value as a key, with the track's largest distance from it, in metres; then rest and middle."""
     found = []
     for value in values:
         if track.path == "rotation" and track.values[0] @ value < 0:
             value = -value
-        found.append((value, float(np.linalg.norm(track.values - value, axis=1).max()) * track.meters))
-    return found
+        apart = track.values - value
+        error = math.sqrt(float(np.einsum("wc,wc->w", apart, apart).max())) * track.meters
+        found.append((quantization.constant_cost(value), error))
+    found.append((quantization.constant_cost(track.rest), track.from_rest))
+    return [*found, (quantization.constant_cost(track.middle), track.from_middle)]
 
 
 class BoundUsage:
