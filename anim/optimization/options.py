@@ -102,7 +102,7 @@ class Effort:
 
 
 FAST = Effort(5)
-BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), random_trials=25, coarsen_passes=2)
+BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), random_trials=30, coarsen_passes=2)
 MAX = Effort(
     10,
     (0.1, 0.25, 0.4, 0.6, 0.8),

@@ -10,7 +10,9 @@ ERROR_FRACTIONS = tuple(
     10.0 ** (-exponent / 2) for exponent in range(10, 3, -1)
 )  # of the diagonal: 1e-5 to 1e-2, two a decade
 MIN_BOUND_PER_DIAGONAL, MAX_BOUND_PER_DIAGONAL = 1e-6, 0.1  # range of the search
-NUM_BISECTIONS = 9  # of the bound's logarithm: within 2 % of the smallest such bound
+FIRST_BOUND_PER_DIAGONAL = 1e-3  # of the search
+SIZE_TOLERANCE = 1e-3  # of the maximum size: fewer unused bytes are not worth another search
+LOG_BOUND_TOLERANCE = 0.0225  # of the bound's natural logarithm: within 2 % of the smallest such bound
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,21 +39,32 @@ def curve(
 def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], RatePoint]) -> RatePoint | None:
     """Return the smallest bound found that takes at most `max_bytes`; None if there is none.
 
-    Bounds go up to a tenth of the diagonal. Bisects the logarithm of the bound; sizes decrease with it except for the
-    noise of the search, a few percent.
+    Bounds go up to a tenth of the diagonal. Sizes decrease with the bound's logarithm except for the noise of the
+    search, a few percent: the bound is interpolated between the nearest ones that are too small and large enough, and
+    the interval between them is bisected where that did not halve it.
     """
     exact = tried(0.0)
     if exact.size <= max_bytes:
         return exact
-    best = tried(MAX_BOUND_PER_DIAGONAL * diagonal)
-    if best.size > max_bytes:
-        return None
     low, high = math.log(MIN_BOUND_PER_DIAGONAL * diagonal), math.log(MAX_BOUND_PER_DIAGONAL * diagonal)
-    for _ in range(NUM_BISECTIONS):
-        middle = (low + high) / 2
-        found = tried(math.exp(middle))
+    best, over, at = None, exact.size, math.log(FIRST_BOUND_PER_DIAGONAL * diagonal)
+    while best is None:
+        found = tried(math.exp(at))
         if found.size <= max_bytes:
-            best, high = found, middle
+            best, high = found, at
+        elif at >= high:
+            return None
         else:
-            low = middle
+            low, over, at = at, found.size, high
+    width = math.inf
+    while high - low > LOG_BOUND_TOLERANCE and max_bytes - best.size > SIZE_TOLERANCE * max_bytes:
+        fraction = (over - max_bytes) / (over - best.size) if high - low <= width / 2 else 0.5
+        width = high - low
+        margin = 0.95 * LOG_BOUND_TOLERANCE  # a bound next to the end of the interval can close it
+        at = min(max(low + fraction * width, low + margin), high - margin)
+        found = tried(math.exp(at))
+        if found.size <= max_bytes:
+            best, high = found, at
+        else:
+            low, over = at, found.size
     return best

@@ -70,3 +70,16 @@ def test_what_is_given_back_was_tried_and_fits_though_sizes_are_noisy() -> None:
     assert found in tried
     assert found is not None
     assert found.size <= 2400
+
+
+@pytest.mark.parametrize("share", [3e-6, 1e-4, 1e-3, 0.02, 0.09])
+def test_few_searches_find_the_bound(share: float) -> None:
+    """Bisection took 11 for any of these."""
+    asked: list[float] = []
+
+    def tried(max_error: float) -> RatePoint:
+        asked.append(max_error)
+        return _sized(max_error)
+
+    smallest_error(_sized(share * DIAGONAL).size, DIAGONAL, tried)
+    assert len(asked) <= 8

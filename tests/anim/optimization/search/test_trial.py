@@ -152,3 +152,14 @@ def test_tracks_stored_alike_count_once() -> None:
     pair, one = (runner.run(_plan(runner, axes="full")) for runner in (both, alone))
     assert pair.actions.tolist() == [TrackAction.KEYED, TrackAction.KEYED]
     assert pair.size - one.size == CORE.byte_costs.repeated
+
+
+def test_results_that_are_not_smaller_are_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    runner = _bench(waving())
+    plan, measured = _plan(runner), list[int]()
+    full = runner.run(plan)
+    monkeypatch.setattr(BoundUsage, "_usage", lambda *_: measured.append(1) or np.zeros(1))
+    assert runner.run_smaller(plan, full.size) is None
+    assert not measured
+    assert runner.run_smaller(plan, full.size + 1) is not None
+    assert measured
