@@ -156,9 +156,15 @@ def test_tracks_stored_alike_count_once() -> None:
 
 def test_results_that_are_not_smaller_are_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     runner = _bench(waving())
-    plan, measured = _plan(runner), list[int]()
+    plan = _plan(runner)
     full = runner.run(plan)
-    monkeypatch.setattr(BoundUsage, "_usage", lambda *_: measured.append(1) or np.zeros(1))
+    measured: list[object] = []
+
+    def counted(*arguments: object) -> Floats:
+        measured.append(arguments)
+        return np.zeros(1)
+
+    monkeypatch.setattr(BoundUsage, "_usage", counted)
     assert runner.run_smaller(plan, full.size) is None
     assert not measured
     assert runner.run_smaller(plan, full.size + 1) is not None
