@@ -13,7 +13,7 @@ from anim.errors import RangeError, UnstableError
 from anim.model import Clip, FrameChunk, Scene, VertexCache
 from anim.simulation.cloth.driver import ClothDriver
 from anim.simulation.cloth.elongation import ElongationRecord, join_elongations, measure_elongation
-from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop
+from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop, loop_rows
 from anim.simulation.cloth.model import ClothModel, build_cloth
 from anim.simulation.cloth.options import SOLVERS, ClothOptions
 from anim.simulation.cloth.report import ClothFrames, make_failed_report, make_report
@@ -112,9 +112,9 @@ def _simulate(
 def _loop(
     model: ClothModel, options: ClothOptions, frames: Iterator[tuple[Floats, float]], record: ElongationRecord
 ) -> ClothFrames:
-    """The last round, closed, with the elongations of its steps and of its frames, which are blended at the end."""
+    """One round, closed, with the elongations of its steps and of its frames, which are blended at the seam."""
     positions, energies, seam = close_loop(frames, options.num_frames, options.fps)
-    steps = record.frames[-len(positions) :]
+    steps = [record.frames[row] for row in loop_rows(seam.first, options.num_frames - 1)]
     blended = [measure_elongation(model, x) for x in positions]
     return ClothFrames(
         positions, energies, [join_elongations(*each) for each in zip(steps, blended, strict=True)], seam
