@@ -116,6 +116,25 @@ def test_other_meshes_stay_unless_meshes_are_selected(call: Call, source: Path) 
     assert meshes("--rigid") == ["strip", "flag", "dust"]
 
 
+def test_the_data_of_meshes_that_are_left_out_is_gone(call: Call, asset: Find, tmp_path: Path) -> None:
+    out = tmp_path / "body.glb"
+    assert call("bake", asset("Knight.glb"), out, "--clip", "Cheer", "--mesh", "Knight_Body", "--fps", "4").code == 0
+    json = opened_path(out).json
+    (mesh,) = json["meshes"]
+    assert [node["mesh"] for node in json["nodes"] if "mesh" in node] == [0]
+    used = json["accessors"][mesh["primitives"][0]["attributes"]["TEXCOORD_0"]]["count"]
+    assert {each["count"] for each in json["accessors"] if each["type"] == "VEC2"} == {used}
+    if validate is not None:
+        assert errors(validate(out.read_bytes())) == []
+
+
+def test_meshes_stay_if_an_unknown_extension_may_name_them(call: Call, source: Path) -> None:
+    document = opened_path(source)
+    document.json["extensions"][UNKNOWN]["mesh"] = 2
+    source.write_bytes(glb_of(document))
+    assert len(baked(call, source, "--clip", "bend", "--mesh", "strip").json["meshes"]) == 3
+
+
 def test_a_bake_of_a_range(call: Call, source: Path) -> None:
     out = source.with_name("out.npz")
     assert call("bake", source, out, "--clip", "bend", "--from", "0.2", "--to", "0.75").code == 0

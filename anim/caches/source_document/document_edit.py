@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats
 from anim.caches.source_document import placement, retained_channels
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span
+from anim.caches.source_document.excluded_meshes import drop_meshes
 from anim.caches.source_document.primitives import BakedVertices, baked_primitives
 from anim.caches.source_document.winding import ReversedFaces, has_negative_determinant
 from anim.gltf.document import Document, Json, copy_json, json_array
@@ -41,8 +42,15 @@ class DocumentEdit:
 
     @classmethod
     def of(cls, source: BakeSource, meshes: Sequence[BakedMesh]) -> DocumentEdit:
-        """Return an edit in which the nodes of baked and left-out meshes have none."""
-        json = copy_json(source.document.json)
+        """Return an edit in which the nodes of baked and left-out meshes have none.
+
+        Only nodes, scenes and the list of meshes are copied; all else is shared with the source, and replaced whole.
+        """
+        json = dict(source.document.json)
+        for key in ("nodes", "scenes"):
+            if key in json:
+                json[key] = copy_json(json[key])
+        json["meshes"] = list(json["meshes"])
         placement.detach_meshes(json, {each.node for each in meshes} | source.left_out)
         return cls(source, meshes, json, NewAccessors(len(json_array(json, "accessors"))))
 
@@ -97,8 +105,10 @@ class DocumentEdit:
                 self.json[key] = [*names, *missing]
 
     def document(self) -> Document:
-        """Return the edited document: one clip, no skins that no mesh uses, no bytes that nothing uses."""
+        """Return the edited document: one clip, no left-out meshes, no skins and no bytes that nothing uses."""
         clip = self._clip()
+        left_out = {self.source.document.json["nodes"][node]["mesh"] for node in self.source.left_out}
+        drop_meshes(self.json, left_out, clip)
         if not self.source.keep_skeleton:
             retained_channels.drop_unused_skins(self.json)
         if clip["channels"]:

@@ -13,7 +13,7 @@ from anim.gltf.writing.append import COMPONENT_TYPES, ELEMENTS, VERTICES
 from anim.gltf.writing.buffer_views import View
 from anim.gltf.writing.buffers import rebuild_buffers
 from anim.gltf.writing.insertion import EMPTY_ACCESSOR
-from anim.gltf.writing.references import references_outside
+from anim.gltf.writing.references import named_accessors, references_outside
 
 ViewKey = tuple[int | None, int]  # target, and bytes per element
 
@@ -95,7 +95,7 @@ def edit_document(document: Document, json: Json, new: NewAccessors) -> Document
     """
     accessors, old_views = json_array(document.json, "accessors"), json_array(document.json, "bufferViews")
     used = references_outside(json, ())
-    freed = {i for i in references_outside(document.json, ()).accessors if i < len(accessors)} - used.accessors
+    freed = {i for i in named_accessors(document.json) if i < len(accessors)} - used.accessors
     unused = compaction.unused_views(document, freed, used)
     store = rebuild_buffers(document, freed, unused, used, new.views(), "")
     placeholder = {"buffer": store.target, "byteLength": 1}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -45,17 +45,22 @@ def references_outside(json: Json, replaced: Iterable[int]) -> References:
     Accessors in the result keep index and bytes. Views in it have references other than accessors; views of an accessor
     in the result must be added by the caller, since parts of those may be dropped.
     """
-    skipped = set(replaced)
-    accessors = set(_of_meshes(json)) | set(_of_skins(json)) | set(_of_instancing(json))
-    for i, animation in enumerate(json_array(json, "animations")):
-        for sampler in animation["samplers"] if i not in skipped else ():
-            accessors |= {sampler["input"], sampler["output"]}
+    accessors = named_accessors(json, set(replaced))
     views = {image["bufferView"] for image in json_array(json, "images") if "bufferView" in image}
     views |= set(_of_draco(json))
     parts = [part for _, part in unknown_extensions(json)]
     unknown = {number for part in parts for number in _whole_numbers(part)}
     frozen = {part["buffer"] for part in _objects(parts) if type(part.get("buffer")) is int}
     return References(frozenset(accessors | unknown), frozenset(views | unknown), frozenset(frozen))
+
+
+def named_accessors(json: Json, skipped: Collection[int] = ()) -> set[int]:
+    """Return the accessors of meshes, skins, known extensions and animations but those `skipped`."""
+    found = set(_of_meshes(json)) | set(_of_skins(json)) | set(_of_instancing(json))
+    for i, animation in enumerate(json_array(json, "animations")):
+        for sampler in animation["samplers"] if i not in skipped else ():
+            found |= {sampler["input"], sampler["output"]}
+    return found
 
 
 def unknown_indices(json: Json) -> set[int]:
