@@ -12,7 +12,7 @@ def channel(pointer: str) -> dict[str, Any]:
 
 
 def test_nodes_and_pointers_are_renumbered() -> None:
-    json = {"meshes": [{"name": name} for name in "abc"], "nodes": [{"mesh": 2}, {}, {"mesh": 0}]}
+    json: dict[str, Any] = {"meshes": [{"name": name} for name in "abc"], "nodes": [{"mesh": 2}, {}, {"mesh": 0}]}
     node = {"sampler": 0, "target": {"node": 2, "path": "translation"}}
     clip = {"channels": [channel("/meshes/2/weights/0"), channel("/meshes/1/extras/x"), node]}
     drop_meshes(json, {0, 1}, clip)
@@ -21,6 +21,6 @@ def test_nodes_and_pointers_are_renumbered() -> None:
 
 
 def test_an_unknown_extension_that_may_name_a_mesh_keeps_all() -> None:
-    json = {"meshes": [{}, {}], "nodes": [{"mesh": 1}], "extensions": {"ACME": {"mesh": 1}}}
+    json: dict[str, Any] = {"meshes": [{}, {}], "nodes": [{"mesh": 1}], "extensions": {"ACME": {"mesh": 1}}}
     drop_meshes(json, {0}, {"channels": []})
     assert len(json["meshes"]) == 2
