@@ -24,18 +24,22 @@ from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
+from anim.show.page.comparison import ClipPair, compare_content
 from anim.show.plots import error_plot as picture
 from anim.show.plots.figure import FORMATS
 from anim.units import is_zero
 from cli import units
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
+from cli.io.page_files import open_page_file
+from cli.io.page_output import check_page, page_file, write_page
 from cli.options import common
 from cli.options.common import Format
 from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length, plural
+from cli.workflows.page_comparison import compare_files, worst_view
 from cli.workflows.vertex_diff import diff_by_vertex, is_cache
 from cli.workflows.vertex_motion import is_bake_of, pages_of
 
@@ -75,6 +79,7 @@ def command(
     fps: Annotated[
         float, typer.Option("--samples-per-second", metavar="N", help="Samples per second, in addition to all keys.")
     ] = FPS,
+    html: common.Html = None,
     shell: Annotated[
         str,
         typer.Option(
@@ -111,6 +116,10 @@ def command(
     if fps <= 0:
         raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
     kind = "" if plot is None else _kind(plot)
+    if html is not None:
+        check_page(html, "--html")
+        if new is None or player is not SPEC:
+            raise UsageError("--html shows two files as glTF specifies (expected neither --player nor --players)")
     one = other = None
     if not (is_cache(old) or is_cache(new)):
         one = _opened(old, voice)
@@ -122,6 +131,8 @@ def command(
             side.file.name: (side.document, side.file.size, side.scene) for side in (one, other) if side is not None
         }
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, voice, opened=opened)
+        if html is not None:
+            _write_vertex_page(html, old, new, clip, voice)
         _by_vertex(found_by_vertex, format, fail_above, voice, quiet=quiet)
         return
     assert one is not None
@@ -147,8 +158,30 @@ def command(
         drawn = _drawn(report, ruler, one, other, kind, limit)
         documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
         voice.info(f"{plot}  {format_bytes(len(drawn))}")
+    if html is not None:
+        assert new is not None
+        _write_page(html, report, ruler, (old, one), (new, other), voice)
     if limit is not None:
         _check(report, limit)
+
+
+def _write_page(
+    path: str, report: DiffReport, ruler: ErrorMetric, one: tuple[str, _Side], other: tuple[str, _Side], voice: Reporter
+) -> None:
+    """Write the page of both files, with the table of clips."""
+    pairs = [ClipPair(each.old, each.new, each.error, each.statistics.p99) for each in report.diff.clips]
+    content = compare_content(ruler, one[1].clips, other[1].clips, pairs, fps=report.fps)
+    files = [page_file(name, side.document, side.file.size) for name, side in (one, other)]
+    write_page(path, files[0], files[1], voice, content=content, view=worst_view(files[0], content))
+
+
+def _write_vertex_page(path: str, old: str, new: str, clip: Sequence[str] | None, voice: Reporter) -> None:
+    """Write the page of a bake and its source, or of caches."""
+    one, other = open_page_file(old, voice), open_page_file(new, voice)
+    names = reader.names(one.document)
+    name = names[Selection(tuple(clip)).chosen_clips(names)[0]] if clip and len(names) > 1 else None
+    content = compare_files(one, other, voice, clip=name)
+    write_page(path, one, other, voice, content=content, view=worst_view(one, content))
 
 
 def _are_bake_and_source(one: _Side, other: _Side) -> bool:

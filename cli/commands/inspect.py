@@ -18,11 +18,15 @@ from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import Facts
 from anim.operations.selection import Selection
 from cli import errors, tables
-from cli.errors import CheckError
+from cli.errors import CheckError, UsageError
 from cli.io import documents, input_files
+from cli.io.page_files import open_page_file
+from cli.io.page_output import check_page, write_page
 from cli.options import common
 from cli.reports import inspect_report, json_report
 from cli.reports.inspect_report import Inspected, Smoothness
+from cli.reports.page_panels import report_panels
+from cli.text import Reporter
 from cli.workflows import checked_files
 
 SCHEMA = 1
@@ -53,6 +57,7 @@ def command(
         Severity | None,
         typer.Option("--fail-on", help="Exit 6 if a finding has this severity or a worse one.", show_default=False),
     ] = None,
+    html: common.Html = None,
     clip: common.Clips = None,
     quiet: common.Quiet = False,
 ) -> int:
@@ -72,6 +77,10 @@ def command(
     smooth: list[Smoothness] = []
     refused: list[AnimError] = []
     paths = input_files.expand(inputs or [documents.PIPE])
+    if html is not None:
+        check_page(html, "--html")
+        if len(paths) > 1 or paths[0] == documents.PIPE:
+            raise UsageError("--html is about one file with a name")
     for path in paths:
         try:
             inspected, tracks_of_clips = _inspected(path, selection, tracks=tracks, continuity=continuity)
@@ -91,6 +100,9 @@ def command(
             page = inspect_report.page(inspected, smooth[i], tracks=tracks)
             documents.write_text(("\n" if i else "") + page)
     worst = max(map(errors.report_error, refused), default=errors.DONE)
+    if html is not None and worst == errors.DONE:
+        voice = Reporter(quiet)
+        write_page(html, open_page_file(paths[0], voice), None, voice, panels=report_panels(done[0]))
     if fail_on is not None:
         _check(done, fail_on)
     return worst

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import Annotated
@@ -19,12 +20,15 @@ from anim.optimization.options import EFFORTS, PLAYERS, Drop, Objective, Packing
 from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, curve
 from cli.errors import UsageError
 from cli.io import documents
+from cli.io.page_output import check_page, page_file, write_page
 from cli.options import common
 from cli.reports import optimize_json, optimize_report
+from cli.reports.page_panels import size_panels
 from cli.text import Reporter
 from cli.workflows import many_files, optimize_job
 from cli.workflows.edit_clips import note_images
 from cli.workflows.optimize_job import OptimizeJob
+from cli.workflows.page_comparison import compare_files, worst_view
 
 PICTURES = (".png", ".svg")
 
@@ -138,6 +142,7 @@ def command(
     report: Annotated[
         str | None, typer.Option("--report", metavar="FILE", help="Write all measurements as JSON; '-' for stdout.")
     ] = None,
+    html: common.Html = None,
     curve_file: Annotated[
         str | None,
         typer.Option(
@@ -170,6 +175,11 @@ def command(
         raise UsageError("--curve goes with neither --max-bytes nor --report")
     if out is not None and (report is not None or curve_file is not None):
         raise UsageError(f"--{'curve' if report is None else 'report'} is about one file: leave out --out")
+
+    if html is not None:
+        check_page(html, "--html")
+        if out is not None or curve_file is not None:
+            raise UsageError(f"--html goes with neither --{'out' if curve_file is None else 'curve'}")
 
     def edit(input: str, output: str) -> None:
         began = time.perf_counter()
@@ -216,6 +226,12 @@ def command(
             with _report(about, voice, report, dry_run=dry_run):
                 documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
         _report_result(about, voice, dry_run=dry_run)
+        if html is not None and not dry_run:
+            before = page_file(input, about.before, source.size)
+            after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
+            content = compare_files(before, after, voice)
+            view = worst_view(before, content)
+            write_page(html, before, after, voice, content=content, panels=size_panels(about), view=view)
         if not dry_run:
             note_images(about.after, source, output, voice)
 

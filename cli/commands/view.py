@@ -8,20 +8,16 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from anim.errors import AnimError
 from anim.gltf.reading import reader
-from anim.measure.error.metric import ErrorMetric
 from anim.operations.selection import Selection
-from anim.show.page.comparison import compare_clips, compare_content
-from anim.show.page.page import EMPTY, SHOWS, PageContent, PageFile, PageView, page
-from anim.show.page.resources import read_script
+from anim.show.page.page import EMPTY, SHOWS, START_VIEW, PageFile, PageView, page
 from cli.errors import UsageError
-from cli.io import browser, documents, scenes
+from cli.io import browser, documents
 from cli.io.page_files import open_page_file
+from cli.io.page_output import check_page
 from cli.options import common
 from cli.text import Reporter, format_bytes, format_duration, format_length
-
-PAGE_SUFFIXES = (".html", ".htm")
+from cli.workflows.page_comparison import compare_files, worst_view
 
 
 def command(
@@ -55,20 +51,26 @@ def command(
 
     The page is one file without any network: it can be mailed, attached to a ticket, or kept as an artifact of CI.
     With B, both move side by side under one camera, the heat shows the distance of each vertex, and the largest error
-    of each clip is a link. Press ? on the page for its keys; its address keeps clip, time, node and views.
+    of each clip is a link; the page begins at the largest of all. Press ? on the page for its keys; its address keeps
+    clip, time, node and views.
 
     Without --out the page is opened in the browser, and leaves no file. --clip, --node, --at and --show choose what is
     seen first.
     """
     voice = Reporter(quiet)
     began = time.perf_counter()
-    read_script()  # first: without it there is no page, whatever the input
-    _check(input, other, output)
+    if input == other == documents.PIPE:
+        raise UsageError("IN and B can't both be stdin")
+    check_page(documents.PIPE if output is None else output)
     shows = _shows(show)
     first = open_page_file(input, voice)
     second = None if other is None else open_page_file(other, voice)
-    content = EMPTY if second is None else _compare(first, second, voice)
     view = _view(first, clip, node, at, shows)
+    content = EMPTY
+    if second is not None:
+        content = compare_files(first, second, voice, clip=view.clip)
+        if view == START_VIEW:
+            view = worst_view(first, content)
     made = page(first, second, title=title or "", view=view, content=content)
     if output is None:
         if not browser.show_once(made):
@@ -79,16 +81,6 @@ def command(
     words = f", max {format_length(worst)}" if content.errors else ""
     called = input if output == documents.PIPE else output
     voice.info(f"{called}  {format_bytes(len(made))}{words}, {format_duration(time.perf_counter() - began)}")
-
-
-def _check(input: str, other: str | None, output: str | None) -> None:
-    if input == other == documents.PIPE:
-        raise UsageError("IN and B can't both be stdin")
-    if output is None or output == documents.PIPE:
-        return
-    documents.check_file(output)
-    if not output.lower().endswith(PAGE_SUFFIXES):
-        raise UsageError(f"{output}: is no .html file (expected a name such as page.html)")
 
 
 def _shows(show: str | None) -> tuple[str, ...]:
@@ -109,16 +101,3 @@ def _view(
     if chosen_node is not None and not shows:
         shows = ("curves",)
     return PageView(chosen_clip, chosen_node, at, shows)
-
-
-def _compare(one: PageFile, other: PageFile, voice: Reporter) -> PageContent:
-    """Errors over time, where both can be measured; else the page compares vertices by itself."""
-    try:
-        found = [scenes.read_scene(each.document, each.name, voice) for each in (one, other)]
-        clips = reader.clips(one.document), reader.clips(other.document)
-        ruler = ErrorMetric(*found)
-        pairs = compare_clips(ruler, *clips)
-    except AnimError as error:
-        voice.info(f"note: without errors over time: {error}")
-        return EMPTY
-    return compare_content(ruler, *clips, pairs)

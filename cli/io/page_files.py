@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import PurePath
 
 from anim.arrays import Bytes
@@ -66,7 +67,7 @@ def _of_document(document: Document, name: str, size: int, beside: Resolve | Non
 
 
 def _of_cache(cache: VertexCache, name: str, size: int) -> PageFile:
-    return _converted(convert_cache(cache, PurePath(name).stem), name, size)
+    return replace(_converted(convert_cache(cache, PurePath(name).stem), name, size), is_cache=True)
 
 
 def _converted(source: PageSource, name: str, size: int) -> PageFile:

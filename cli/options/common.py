@@ -55,6 +55,10 @@ class Format(StrEnum):
 Report = Annotated[Format, typer.Option("--format", help="Report format: text or one JSON document.")]
 From = Annotated[float | None, typer.Option("--from", metavar="S", help="Start time in seconds.")]
 To = Annotated[float | None, typer.Option("--to", metavar="S", help="End time in seconds.")]
+Html = Annotated[
+    str | None,
+    typer.Option("--html", metavar="OUT", help="Write a page for the browser, as `view` does: a .html file."),
+]
 DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Write nothing.")]
 Quiet = Annotated[
     bool,

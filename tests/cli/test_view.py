@@ -172,3 +172,60 @@ def test_one_answer_on_the_loopback_and_no_second() -> None:
 def test_without_a_browser_it_ends() -> None:
     assert not browser.show_once(b"", open_url=lambda _: False)
     assert not browser.show_once(b"", open_url=lambda _: True, wait=0.05)
+
+
+@needs_page
+def test_reports_as_pages(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    small = tmp_path / "small.glb"
+    run = call(
+        "optimize", fixture("biped"), small, "--max-error", "3%", "--effort", "fast", "--html", tmp_path / "o.html"
+    )
+    assert "o.html  " in run.err
+    said = facts((tmp_path / "o.html").read_bytes())
+    assert [each["title"] for each in said["panels"]] == ["Size", "Largest errors"]
+    assert [each["name"] for each in said["files"]] == ["biped.glb", "small.glb"]
+    table = call("diff", fixture("biped"), small, "--html", tmp_path / "d.html").product()
+    assert table
+    said = facts((tmp_path / "d.html").read_bytes())
+    assert said["view"]["show"] == ["heat"]
+    assert said["view"]["t"] == said["panels"][0]["rows"][0]["link"]["time"]
+    call("inspect", fixture("biped"), "--html", tmp_path / "i.html").product()
+    said = facts((tmp_path / "i.html").read_bytes())
+    assert [each["title"] for each in said["panels"]] == ["Findings", "Contents"]
+
+
+@needs_page
+def test_findings_link_to_their_clip_or_node(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(renamed(built("arm"), ["", "x"]))
+    call("inspect", tmp_path / "a.glb", "--html", tmp_path / "i.html").product()
+    rows = facts((tmp_path / "i.html").read_bytes())["panels"][0]["rows"]
+    assert [row["link"]["clip"] for row in rows if row["cells"][0].startswith("GA001")] == [0]
+
+
+@needs_page
+def test_a_bake_beside_its_source(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    cache = tmp_path / "wave.npz"
+    call("bake", fixture("biped"), cache, "--clip", "wave", "--fps", "8")
+    call("diff", fixture("biped"), cache, "--clip", "wave", "--html", tmp_path / "d.html").product()
+    said = facts((tmp_path / "d.html").read_bytes())
+    assert said["view"]["clip"] == "wave"
+    assert list(said["partners"].values()) == [0]
+    assert not said["errors"]
+
+
+@needs_page
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("diff", "a.glb", "--players", "spec,nlerp", "--html", "p.html"), "two files"),
+        (("inspect", "-", "--html", "p.html"), "one file with a name"),
+        (("inspect", "a.glb", "--html", "p.png"), "no .html file"),
+        (("optimize", "a.glb", "b.glb", "--html", "p.html", "--curve", "c.csv"), "--curve"),
+    ],
+)
+def test_pages_that_reports_refuse(
+    args: tuple[str, ...], words: str, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.glb").write_bytes(built("arm"))
+    assert words in refusal(call(*args, stdin=built("arm")), 2)

@@ -31,7 +31,7 @@ class PageFile:
     """A file on a page.
 
     document: what is shown. name: for headings. size: bytes of the file, 0 if unknown. notes: lines about differences
-    to the file, beside those of `embed`. resolve: see `embed`.
+    to the file, beside those of `embed`. resolve: see `embed`. is_cache: whether it was a vertex cache, without joints.
     """
 
     document: Document
@@ -39,6 +39,7 @@ class PageFile:
     size: int = 0
     notes: tuple[str, ...] = ()
     resolve: Resolve | None = None
+    is_cache: bool = False
 
 
 @dataclass(frozen=True, slots=True)

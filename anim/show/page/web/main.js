@@ -74,7 +74,8 @@ class Player {
   #samePlace(index) {
     const [a, b] = this.sides;
     const named = b.clipNames.indexOf(a.clipNames[index]);
-    return named >= 0 ? named : index;
+    if (named >= 0) return named;
+    return a.clips.length === b.clips.length && !Object.keys(facts.partners ?? {}).length ? index : -1;
   }
 
   seek(time, { pause = false } = {}) {

@@ -4,14 +4,16 @@ import { $, make, setPressed } from "./dom.js";
 import { formatBytes, formatLength, formatTime } from "./format.js";
 
 const MIN_FILTERED = 12; // nodes from which on there is a filter
+const MAX_ROWS = 8; // of a panel, before the rest is folded
 const INDENT_PX = 11;
 const MAX_INDENT = 10;
 
 /** Fill the sidebar. actions: {chooseClip, chooseNode, follow}. */
 export function fillSidebar(sides, facts, actions) {
   const list = $("#side");
-  list.append(clipSection(sides[0], facts, actions));
-  for (const panel of facts.panels ?? []) list.append(panelSection(panel, actions));
+  const panels = (facts.panels ?? []).map((panel) => panelSection(panel, actions));
+  const clips = clipSection(sides[0], facts, actions);
+  list.append(...(sides.length > 1 ? [...panels, clips] : [clips, ...panels])); // of two files the errors matter most
   list.append(nodeSection(sides[0], actions), fileSection(facts));
 }
 
@@ -78,12 +80,16 @@ function panelSection(panel, { follow }) {
       make("span", { class: "name" }, name),
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
     ];
-    const attributes = { class: `row ${level ?? ""}`, title: cells.join("  ") };
+    const isLong = !others.length; // a sentence, not a table
+    const attributes = { class: `row ${isLong ? "long" : ""} ${level ?? ""}`, title: cells.join("  ") };
     return link
       ? make("button", { ...attributes, "data-link": "", onclick: () => follow(link) }, ...parts)
       : make("div", attributes, ...parts);
   });
-  return section(panel.title, panel.count ?? "", ...rows);
+  if (rows.length <= MAX_ROWS + 1) return section(panel.title, panel.count ?? "", ...rows);
+  const more = make("details", { class: "more" }, make("summary", {}, `${rows.length - MAX_ROWS} more`));
+  more.append(...rows.slice(MAX_ROWS));
+  return section(panel.title, panel.count ?? "", ...rows.slice(0, MAX_ROWS), more);
 }
 
 function fileSection(facts) {

@@ -1,0 +1,60 @@
+"""Pages as outputs of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from anim.files import resolver
+from anim.gltf.document import Document
+from anim.show.page.page import EMPTY, START_VIEW, PageContent, PageFile, PagePanel, PageView, page
+from anim.show.page.resources import read_script
+from cli.errors import UsageError
+from cli.io import documents
+from cli.streams import locate
+from cli.text import Reporter, format_bytes
+
+PAGE_SUFFIXES = (".html", ".htm")
+
+
+def check_page(path: str, option: str = "") -> None:
+    """Raise before any work if no page can be written to `path`: UsageError, or UnsupportedError without its script.
+
+    option: which the path is given by, for the message.
+    """
+    read_script()
+    if path == documents.PIPE:
+        return
+    documents.check_file(path)
+    if not path.lower().endswith(PAGE_SUFFIXES):
+        prefix = f"{option}: " if option else ""
+        raise UsageError(f"{prefix}{path}: is no .html file (expected a name such as page.html)")
+
+
+def page_file(path: str, document: Document, size: int) -> PageFile:
+    """Return a file that a command has read, for a page; from a pipe, which can't be read again, its document."""
+    if path == documents.PIPE:
+        return PageFile(document, "stdin", size)
+    beside = resolver.CompanionFiles(Path(locate(path)).parent).open
+    return PageFile(document, PurePath(path).name, size, resolve=beside)
+
+
+def write_page(
+    path: str,
+    file: PageFile,
+    other: PageFile | None,
+    voice: Reporter,
+    *,
+    content: PageContent = EMPTY,
+    panels: Sequence[PagePanel] = (),
+    view: PageView = START_VIEW,
+    title: str = "",
+) -> None:
+    """Write a page, and report its size. panels: before those of the content."""
+    content = replace(content, panels=(*panels, *content.panels))
+    made = page(file, other, title=title, view=view, content=content)
+    documents.write_bytes([np.frombuffer(made, np.uint8)], path)
+    voice.info(f"{path}  {format_bytes(len(made))}")

@@ -1,0 +1,40 @@
+"""Comparison of two files on a page: errors over time, and the state that shows the worst."""
+
+from __future__ import annotations
+
+from anim.errors import AnimError
+from anim.gltf.reading import reader
+from anim.measure.error.metric import ErrorMetric
+from anim.show.page.comparison import compare_clips, compare_content
+from anim.show.page.page import EMPTY, PageContent, PageFile, PageView
+from cli.text import Reporter
+from cli.workflows.vertex_motion import is_bake_of
+
+
+def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str | None = None) -> PageContent:
+    """Return errors over time, where both files can be measured by joints; else the page measures vertices by itself.
+
+    clip: name of the first file's clip that a bake or a cache is of.
+    """
+    try:
+        scenes = reader.scene(one.document), reader.scene(other.document)
+        clips = reader.clips(one.document), reader.clips(other.document)
+        if one.is_cache or other.is_cache or is_bake_of(*scenes) or is_bake_of(scenes[1], scenes[0]):
+            names = [reader.clip_name(each.name, i) for i, each in enumerate(clips[0])]
+            index = names.index(clip) if clip in names else 0
+            return PageContent(partners={index: 0} if len(clips[1]) == 1 else {})
+        ruler = ErrorMetric(*scenes)
+        return compare_content(ruler, *clips, compare_clips(ruler, *clips))
+    except AnimError as error:
+        voice.info(f"note: without errors over time: {error}")
+        return EMPTY
+
+
+def worst_view(file: PageFile, content: PageContent) -> PageView:
+    """Return the view of the largest error, with heat: paused there if there is one."""
+    link = next((row.link for panel in content.panels for row in panel.rows if row.link is not None), None)
+    if link is None or link.clip is None:
+        clip = next(iter(content.partners), 0)
+        names = reader.names(file.document)
+        return PageView(reader.clip_name(names[clip], clip) if names else None, show=("heat",))
+    return PageView(reader.clip_name(reader.names(file.document)[link.clip], link.clip), None, link.time, ("heat",))
