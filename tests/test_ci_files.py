@@ -7,7 +7,6 @@ import re
 import shlex
 import subprocess
 import sys
-import textwrap
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -19,13 +18,13 @@ import yaml
 from cli.main import COMMANDS
 from docs.pages import run
 from tests.cli.running import ROOT, built
+from tests.pages import needs_page
 
 
-def script_of_action() -> str:
-    text = (ROOT / "action.yml").read_text(encoding="utf-8")
-    found = re.search(r"- name: Check\n.*?run: \|\n(.*?)    - name:", text, re.DOTALL)
-    assert found
-    return textwrap.dedent(found.group(1))
+def script_of_action(name: str = "Check") -> str:
+    steps = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))["runs"]["steps"]
+    (script,) = (str(step["run"]) for step in steps if step["name"] == name)
+    return script
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="bash and pip's scripts differ there")
@@ -38,6 +37,35 @@ def test_the_action_annotates_sums_up_and_fails(fail_on: str, code: int, tmp_pat
     assert "::warning file=noop.glb,title=GA101 wide-steps::" in done.stdout
     assert "| noop.glb | warning | GA101 wide-steps |" in (tmp_path / "summary.md").read_text("utf-8")
     assert json.loads((tmp_path / "gltf-anim.sarif").read_text("utf-8"))["version"] == "2.1.0"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="bash and pip's scripts differ there")
+def test_the_action_finds_files_at_any_depth(tmp_path: Path) -> None:
+    """Bash takes ** for *."""
+    (tmp_path / "a/b/c").mkdir(parents=True)
+    (tmp_path / "a/b/c/noop.glb").write_bytes(built("noop"))
+    (tmp_path / "a/b/noop.glb").write_bytes(built("noop"))
+    variables = "export FILES='a/**/*.glb' OPTIONS= FAIL_ON=error GITHUB_STEP_SUMMARY=summary.md; set -e\n"
+    assert "file=a/b/c/noop.glb,title=GA101" in run(variables + script_of_action(), tmp_path).stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="bash and pip's scripts differ there")
+@needs_page
+def test_the_action_makes_pages_of_changed_files(tmp_path: Path) -> None:
+    work, temp = tmp_path / "work", tmp_path / "temp"
+    for each in (work, temp):
+        each.mkdir()
+    (work / "same.glb").write_bytes(built("tube"))
+    git = "git -c user.name=a -c user.email=a@example.org -c init.defaultBranch=main"
+    prepare = f"{git} init -q; git add .; {git} commit -qm base; git clone -q --bare . ../base.git; mkdir 'a b'\n"
+    prepare += "git remote add origin ../base.git; git checkout -qb change\n"
+    assert run(prepare, work).returncode == 0
+    (work / "a b/new.glb").write_bytes(built("noop"))
+    (work / "a b/bad.glb").write_bytes(b"no glTF")
+    script = f"git add .; set -e; export BASE=main RUNNER_TEMP={shlex.quote(str(temp))}\n{script_of_action('Pages')}"
+    done = run(script, work)
+    assert done.returncode == 0, done.stdout
+    assert [path.name for path in (temp / "gltf-anim").iterdir()] == ["a b_new.glb.html"]
 
 
 def blocks(language: str) -> list[str]:

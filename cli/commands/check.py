@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -175,17 +175,16 @@ def command(
         others = f", {kept.total()} kept of files that were not checked" if kept else ""
         voice.info(f"{write_known}  {len(checker.found)} findings{others}")
         return _worst(checker.refused, len(checker.files))
-    report = CheckReport(checker.files, checker.found, checker.refused)
+    report = CheckReport(checker.files, checker.found, checker.refused, checker.limits)
     if expected is not None and known is not None:
         expected -= _unchecked(expected, report.files, known)
         new, gone = baseline.split(report.found, expected, _relative_to(known))
         report = replace(report, found=new, known=len(report.found) - len(new), gone=sorted(gone.items()))
-    return _report(report, checker.limits, format, quiet=quiet)
+    return _report(report, format, quiet=quiet)
 
 
 def _report(
     report: CheckReport,
-    limits: Mapping[str, Severity],
     format: Format,
     *,
     quiet: bool,
@@ -196,7 +195,7 @@ def _report(
         documents.write_text(WRITERS[format](report))
     worst = _worst(report.refused, len(report.files))
     counted = [each for each in report.found if each[1].code != INVALID.code]
-    bad = [each for each in counted if each[1].severity.is_at_least(limits[each[0]])]
+    bad = [each for each in counted if report.is_failure(*each)]
     if bad and not worst:
         order = list(Severity)  # most severe first
         name, first = min(bad, key=lambda each: order.index(each[1].severity))

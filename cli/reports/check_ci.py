@@ -20,6 +20,7 @@ from cli.tables import escape_control
 COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
 MAX_ANNOTATIONS = 10  # per severity and step that GitHub shows
+MAX_RESULTS = 25_000  # of a run; GitHub refuses files with more
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
@@ -81,14 +82,17 @@ def as_sarif(report: CheckReport) -> str:
         for rule in used
     ]
     seen: Counter[str] = Counter()
-    results = [_result(path, each, index[each.code], seen) for path, each in report.found]
+    worst = sorted(report.found, key=lambda each: list(Severity).index(each[1].severity))[:MAX_RESULTS]
+    results = [_result(path, each, index[each.code], seen) for path, each in worst]
     driver = {"name": "gltf-anim", "version": __version__, "rules": rules}
-    notes = [
+    notes: list[dict[str, Any]] = [
         {"level": "error", "message": {"text": f"{path}: {error}"}, "locations": [_location(path)]}
         for path, error in report.refused
     ]
+    if left := len(report.found) - len(worst):
+        notes.append({"level": "warning", "message": {"text": f"{left} more findings, of the least severe ones"}})
     run: dict[str, Any] = {"tool": {"driver": driver}, "columnKind": "utf16CodeUnits", "results": results}
-    run["invocations"] = [{"executionSuccessful": not notes, "toolExecutionNotifications": notes}]
+    run["invocations"] = [{"executionSuccessful": not report.refused, "toolExecutionNotifications": notes}]
     content = {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
     return json_report.dump(content)
 
@@ -114,12 +118,12 @@ def _location(path: str) -> dict[str, Any]:
 
 
 def as_junit(report: CheckReport) -> str:
-    """Return JUnit XML: a test case per file, which fails on errors; other findings are its output."""
+    """Return JUnit XML: a test case per file, with findings that fail the check; others are its output."""
     refused = dict(report.refused)
     by_file: dict[str, list[Finding]] = {path: [] for path in report.files}
     for path, each in report.found:
         by_file[path].append(each)
-    errors = {path: [each for each in found if each.severity is Severity.ERROR] for path, found in by_file.items()}
+    errors = {path: [each for each in found if report.is_failure(path, each)] for path, found in by_file.items()}
     failures = sum(bool(found) and path not in refused for path, found in errors.items())
     counts = {"tests": str(len(by_file)), "failures": str(failures), "errors": str(len(refused))}
     root = ElementTree.Element("testsuites", counts)
@@ -130,10 +134,11 @@ def as_junit(report: CheckReport) -> str:
             outcome = ElementTree.SubElement(case, "error", {"message": _xml(str(refused[path]))})
             outcome.text = "\n".join(_xml(_line(each)) for each in errors[path])
         elif errors[path]:
-            message = _xml(_line(errors[path][0]))
-            outcome = ElementTree.SubElement(case, "failure", {"message": message, "type": "error"})
+            first = errors[path][0]
+            about = {"message": _xml(_line(first)), "type": str(first.severity)}
+            outcome = ElementTree.SubElement(case, "failure", about)
             outcome.text = "\n".join(_xml(_line(each)) for each in errors[path])
-        if others := [each for each in found if each.severity is not Severity.ERROR]:
+        if others := [each for each in found if not report.is_failure(path, each)]:
             ElementTree.SubElement(case, "system-out").text = "\n".join(_xml(_line(each)) for each in others)
     ElementTree.indent(root, " ")
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from itertools import groupby
 
 from anim.check.baseline import FileFinding, fingerprint
-from anim.check.finding import Severity
+from anim.check.finding import Finding, Severity
 from anim.errors import AnimError
 from cli import tables
 from cli.reports import json_report
@@ -30,14 +30,20 @@ def is_of_source(error: AnimError) -> bool:
 class CheckReport:
     """Result of a check. files: paths of all files. found: new findings. refused: unreadable files.
 
+    limits: severity by file from which on a finding fails the check; errors without one.
     known: number of findings in the baseline; gone: fingerprints of those that no longer exist, with their counts.
     """
 
     files: Sequence[str]
     found: Sequence[FileFinding]
     refused: Sequence[tuple[str, AnimError]]
+    limits: Mapping[str, Severity] = field(default_factory=dict)
     known: int = 0
     gone: Sequence[tuple[str, int]] = ()
+
+    def is_failure(self, path: str, finding: Finding) -> bool:
+        """Return whether a finding fails the check."""
+        return finding.severity.is_at_least(self.limits.get(path, Severity.ERROR))
 
     def count(self, severity: Severity) -> int:
         """Return the number of findings of a severity."""

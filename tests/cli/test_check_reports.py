@@ -74,6 +74,28 @@ def test_junit_has_a_case_per_file(folder: Path, call: Call) -> None:
     assert root.attrib["tests"] == "3"
 
 
+def test_junit_fails_what_fails_the_job(folder: Path, call: Call) -> None:
+    """Otherwise a red job has a report without a failure."""
+    run = call("check", "noop.glb", "--format", "junit", "--fail-on", "warning")
+    root = ElementTree.fromstring(run.text)
+    assert (run.code, root.get("failures")) == (6, "1")
+    failure = root.find(".//failure")
+    assert failure is not None
+    assert failure.get("type") == "warning"
+    assert "info" not in (failure.text or "")
+
+
+def test_sarif_stays_within_the_number_of_results_that_github_takes(
+    folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cli.reports.check_ci.MAX_RESULTS", 2)
+    (run,) = call("check", "noop.glb", "--format", "sarif").json["runs"]
+    assert [each["level"] for each in run["results"]] == ["warning", "warning"]
+    (invocation,) = run["invocations"]
+    assert invocation["executionSuccessful"]
+    assert "more findings" in invocation["toolExecutionNotifications"][0]["message"]["text"]
+
+
 @pytest.mark.parametrize("words", [(".",), ("crowd",), ("bad.glb", "noop.glb", "--select", "GA1")])
 def test_junit_agrees_with_the_schema_of_jenkins(words: tuple[str, ...], folder: Path, call: Call) -> None:
     """Files that can't be read, that fail, with other findings only, and with none; names that XML must escape."""
