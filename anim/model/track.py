@@ -49,6 +49,7 @@ class AccessorFormat:
 
 
 FLOAT32 = AccessorFormat()
+BYTE_UNIT_TOLERANCE = 0.00769  # of the length of quaternions in normalized bytes, from the Khronos validator
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)

@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Interpolation, Track, ValueKind
-from anim.sampling import segment as piece
+from anim.sampling import segment
 
 
 def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -31,10 +31,10 @@ def rates(track: Track, times: Floats, *, before: bool) -> Floats:
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
         return result
     keys = track.times
-    segment = np.searchsorted(keys, times, side="left" if before else "right") - 1
-    inside = (segment >= 0) & (segment < len(keys) - 1)
-    left = segment[inside]
+    index = np.searchsorted(keys, times, side="left" if before else "right") - 1
+    inside = (index >= 0) & (index < len(keys) - 1)
+    left = index[inside]
     duration = keys[left + 1] - keys[left]
-    share = (times[inside] - keys[left]) / duration
-    result[inside] = piece.derivative(track, left, share) / duration[:, None]
+    u = (times[inside] - keys[left]) / duration
+    result[inside] = segment.derivative(track, left, u) / duration[:, None]
     return result

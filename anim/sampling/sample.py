@@ -10,7 +10,7 @@ from anim.errors import RangeError, check_type
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
 from anim.sampling.pose import sample_pose
-from anim.sampling.track import sample as sampled
+from anim.sampling.track import sample as sample_track
 from anim.sampling.world import world_matrices
 
 SPACES = ("local", "world")
@@ -51,7 +51,9 @@ def sample(skeleton: Skeleton, clip: Clip, at: Floats, *, space: str = "local") 
         raise RangeError(f"`space` is '{space}' (expected local or world)")
     local = sample_pose(skeleton, clip, at)
     pointers = {
-        track.pointer: sampled(track, at) for track in clip.tracks if track.node is None and track.pointer is not None
+        track.pointer: sample_track(track, at)
+        for track in clip.tracks
+        if track.node is None and track.pointer is not None
     }
     if space == "local":
         parts = (local.translation, local.rotation, local.scale)

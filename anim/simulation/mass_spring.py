@@ -1,4 +1,4 @@
-"""Point masses joined by damped springs: the lesson's solver of ropes and cloth, and the harmonic oscillator."""
+"""Point masses on damped springs, for cloth and hair by any integrator; the harmonic oscillator."""
 
 from __future__ import annotations
 
@@ -159,17 +159,3 @@ def oscillator(omega: float, damping_ratio: float = 0.0) -> MassSpring:
         np.array([2 * damping_ratio * omega]),
         gravity=(0.0, 0.0, 0.0),
     )
-
-
-def rope(num_points: int, length: float, mass: float, stiffness: float, angle: float) -> tuple[MassSpring, Floats]:
-    """Return a rope of points pinned at its first, and its straight start (P, 3) at `angle` rad from hanging down.
-
-    length: m, mass: kg, of all. stiffness: N/m, of each spring between neighbors.
-    """
-    at = np.linspace(0, length, num_points)
-    x = np.stack([at * np.sin(angle), -at * np.cos(angle), np.zeros(num_points)], axis=1)
-    masses = np.full(num_points, mass / num_points)
-    masses[0] = np.inf
-    springs = np.stack([np.arange(num_points - 1), np.arange(1, num_points)], axis=1)
-    count = num_points - 1
-    return MassSpring(masses, springs, np.full(count, length / count), np.full(count, stiffness), np.zeros(count)), x

@@ -12,7 +12,7 @@ from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.operations.selection import Selection
 from anim.sampling.times import frame_times
-from anim.show.plots.collapse_plot import collapse_plot as picture_of
+from anim.show.plots.collapse_plot import collapse_plot
 from anim.skinning.analysis.collapse import Comparison
 from anim.skinning.analysis.recommendations import CollapseFinding
 from cli.errors import UsageError
@@ -102,7 +102,7 @@ def _check(fps: float, plot: str | None) -> None:
 
 def _draw(seen: CollapseReport, plot: str, voice: Reporter) -> None:
     title = PurePath(seen.name).stem + (", bulge clamp" if seen.clamped else "")
-    picture = picture_of(
+    picture = collapse_plot(
         collapse_report.worst_of_clips(seen.found), title=title, kind=PurePath(plot).suffix.lower()[1:]
     )
     documents.write_bytes([np.frombuffer(picture, np.uint8)], plot)

@@ -14,7 +14,7 @@ from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import KeyPlacement
 from anim.exchange.euler.convention import PartialConvention
 from anim.exchange.euler.evaluate import bounding_size, skeleton
-from anim.exchange.euler.from_euler import from_euler as converted_from
+from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.gimbal import gimbal_stats
 from anim.exchange.euler.motion import EulerMotion, Unit, scale_motion, z_up_to_y_up
 from anim.exchange.euler.unit_guess import guess_unit
@@ -141,7 +141,7 @@ def command(
         motion = z_up_to_y_up(motion) if up is Up.Z else motion
         meters, words, is_guess = _meters_per_unit(motion, scale, known=kind.has_units)
         clip = name or (Path(source).stem if source != documents.PIPE else "motion")
-        converted = converted_from(scale_motion(motion, meters), tolerance=limit, keys=keys, name=clip)
+        converted = from_euler(scale_motion(motion, meters), tolerance=limit, keys=keys, name=clip)
         if not converted.clip.tracks:
             raise FormatError("no curve has a key: there is no motion in it")
     rows = () if quiet and format is Format.TEXT else gimbal_stats(motion, converted.clip)

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from anim.operations.resample import INTERPOLATIONS, KEEP
-from anim.operations.resample import resample as resampled
+from anim.operations.resample import INTERPOLATIONS, KEEP, resample
 from anim.operations.selection import Selection
 from cli.errors import UsageError
 from cli.options import common
@@ -55,7 +54,7 @@ def command(
             input,
             output,
             selection,
-            lambda each, tracks, _: resampled(
+            lambda each, tracks, _: resample(
                 each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks
             ),
             voice,

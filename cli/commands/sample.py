@@ -16,8 +16,7 @@ from anim.gltf.reading import reader
 from anim.memory import MemoryBudget
 from anim.model import Clip, Skeleton
 from anim.operations.selection import Selection
-from anim.sampling.sample import SPACES, PoseTable
-from anim.sampling.sample import sample as sampled
+from anim.sampling.sample import SPACES, PoseTable, sample
 from anim.sampling.times import frame_times
 from cli import tables
 from cli.errors import UsageError
@@ -95,7 +94,7 @@ def command(
         per_number = 1 if chosen_format is Format.NPZ else BYTES_PER_NUMBER
         budget = MemoryBudget(source.size)
         budget.add(per_number * BYTES_PER_POSE * len(skeleton) * sum(map(len, times.values())))
-        taken = [(i, clips[i], sampled(skeleton, clips[i], times[i], space=space.value)) for i in numbers]
+        taken = [(i, clips[i], sample(skeleton, clips[i], times[i], space=space.value)) for i in numbers]
     if chosen_format is Format.NPZ:
         documents.write_bytes([_npz(taken, skeleton, nodes)], output)
     else:

@@ -13,7 +13,7 @@ from anim.errors import NotFoundError
 from anim.exchange.euler.motion import Convention, EulerMotion, Unit
 from anim.exchange.euler.rotation_order import AUTO, DEFAULT_ORDER, OrderRules, parse
 from anim.exchange.euler.to_bvh_motion import to_bvh
-from anim.exchange.euler.to_euler import to_euler as curves_of
+from anim.exchange.euler.to_euler import to_euler
 from anim.exchange.formats.registry import TRACK_FORMATS, TrackFormat, of_path
 from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
 from anim.gltf.document import Document, json_array
@@ -186,7 +186,7 @@ def _motion(
         made = to_bvh(skeleton, clip, order=orders, fps=fps, joints=joints, meters_per_unit=scale)
         return made, "", bound.num_joints, 0.0
     holders = {i for i, node in enumerate(json_array(document.json, "nodes")) if "skin" in node}
-    found = curves_of(
+    found = to_euler(
         skeleton,
         clip,
         order=orders,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats.gltf_stream import signed
 from anim.caches.source_document.bake_source import BakedMesh, Span
@@ -74,8 +72,3 @@ def baked_mesh(source: Json, baked: BakedMesh, primitives: list[Json]) -> Json:
         if not mesh["extras"]:
             del mesh["extras"]
     return mesh
-
-
-def is_moved(rows: AnyArray) -> bool:
-    """Return whether any displacement is not zero."""
-    return bool(np.any(rows))

@@ -102,7 +102,7 @@ def retarget(
         seconds = source.clip.end - source.clip.start
         raise RangeError(f"the motion lasts {seconds:g} s: too long to find foot contacts", help="choose `floor` keep")
     follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, bind_time=bind_time)
-    size = float(np.ptp(follow.at_rest.positions, axis=0).max()) or 1.0
+    size = float(np.ptp(follow.target_rest.positions, axis=0).max()) or 1.0
     knots, before = _times(source.clip)
     times = unique_sorted(np.concatenate((knots, before)))
     looked_at, lowered = times, np.zeros(len(times))
@@ -137,7 +137,7 @@ def _limit_step(times: Floats, step: float) -> Floats:
 def _height_above_floor(follow: PoseTransfer, target: Scene, matching: JointMatch, times: Floats) -> Floats:
     """Height (F,) of the target above the floor with heights scaled only, in metres."""
     found = follow.at(times)
-    feet = find_soles(target, follow.at_rest.positions, [*matching.target_roles.items()])
+    feet = find_soles(target, follow.target_rest.positions, [*matching.target_roles.items()])
     roles = matching.source_roles
     of_source = [with_descendants(follow.source, {roles[f]}) for f in ("left_foot", "right_foot") if f in roles]
     heights, world = found.source[:, :, 1, 3].T, found.world.transpose(1, 0, 2, 3)

@@ -13,8 +13,7 @@ from anim.gltf.document import Document
 from anim.gltf.meshopt.storage import EncodedTrack
 from anim.gltf.reading import reader
 from anim.model import Clip, Track
-
-MAX_LENGTH_ERROR = 0.00769  # deviation of a length from 1, by the Khronos validator: the rounding of normalized bytes
+from anim.model.track import BYTE_UNIT_TOLERANCE
 
 
 def normalize_new(document: Document, clips: Mapping[int, Clip]) -> Mapping[int, Clip]:
@@ -57,12 +56,12 @@ def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | 
 
 
 def _non_unit_tracks(clip: Clip, chosen: Iterable[int]) -> list[int]:
-    """The chosen tracks of a clip with rotations off unit length, in one array: tracks are many and short."""
+    """The chosen tracks of a clip with non-unit rotations, in one array: tracks are many and short."""
     rotations = [n for n in chosen if clip.tracks[n].path == "rotation"]
     if not rotations:
         return []
     counts = [len(clip.tracks[n].times) for n in rotations]
-    off = np.abs(_lengths(np.concatenate([clip.tracks[n].values for n in rotations])) - 1) > MAX_LENGTH_ERROR
+    off = np.abs(_lengths(np.concatenate([clip.tracks[n].values for n in rotations])) - 1) > BYTE_UNIT_TOLERANCE
     if not off.any():
         return []
     has_any = np.logical_or.reduceat(off, np.cumsum([0, *counts[:-1]]))

@@ -20,7 +20,7 @@ from anim.measure.compare.deformation import are_missing, is_reduced, same_influ
 from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
 from anim.model import MeshInstance, Scene, Skin
-from anim.sampling import rest_pose as rest
+from anim.sampling import rest_pose
 from anim.sampling.world import local_by_node
 
 
@@ -104,8 +104,7 @@ class _SceneMatcher:
         self._on_node = {instance.node: instance for instance in self._new}
         old = [instance.mesh.name for instance in scene.instances if len(instance.mesh.positions)]
         self._named = name_matching.match_by_name(old, [instance.mesh.name for instance in self._new]).tolist()
-        rest_pose = rest(scene.skeleton)
-        self._local = local_by_node(scene.skeleton, rest_pose)[:, 0]
+        self._local = local_by_node(scene.skeleton, rest_pose(scene.skeleton))[:, 0]
 
     def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
         """The instance of the other scene with the same vertices: same node, same name, same order."""

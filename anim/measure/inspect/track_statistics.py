@@ -11,12 +11,12 @@ from anim.arrays import Bools, Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Interpolation, Skeleton, Track, ValueKind
+from anim.model.track import BYTE_UNIT_TOLERANCE
 from anim.sampling.batch import ConcatenatedTracks, concatenate
 
 FLOAT32_TOLERANCE = 2.0**-22  # relative; twice the spacing of float32: values closer than this are equal
 KEY_TOLERANCE_PER_RANGE = 1e-6  # fraction of a track's range: tolerance of interpolated keys
-UNIT_TOLERANCE = 1e-3  # tolerance of a quaternion's length
-BYTE_UNIT_TOLERANCE = 0.00769  # the same for quaternions in normalized bytes, from the Khronos validator
+UNIT_TOLERANCE = 1e-3  # of the length of other quaternions
 MAX_INTEGERS = {
     5120: 127,
     5121: 255,

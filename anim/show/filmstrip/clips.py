@@ -177,8 +177,8 @@ def build_strips(
         positions = shot.cache.load_all().positions
         if i == 0 or first.clip != shot.clip:
             first, reference = shot, positions
-            goes = root_path.travels(shot.path) if followed is None else followed
-            way = root_path.root_path(shot.path) if goes else None
+            is_followed = root_path.travels(shot.path) if followed is None else followed
+            camera_path = root_path.root_path(shot.path) if is_followed else None
         alone = sum(other.clip == shot.clip for other in shots) == 1
         distances = _distances(shot, positions, reference, alone, shot is first) if heated else None
         heading = reader.clip_name(shot.name, shot.clip) if several_clips else ""
@@ -192,13 +192,13 @@ def build_strips(
                 shot.colors,
                 distances,
                 heading,
-                way,
+                camera_path,
                 cache.rest,
                 shot.surface,
                 shot.clip,
             )
         )
-        points += [_framing_points(each, way) for each in (shot.path, shot.cache)]
+        points += [_framing_points(each, camera_path) for each in (shot.path, shot.cache)]
     ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
     return found, Extent(np.concatenate(points), ground)
 
@@ -266,15 +266,15 @@ def _framing_times(start: float, end: float) -> Floats:
     return np.linspace(start, end, NUM_FRAMING_FRAMES) if end > start else np.array([start])
 
 
-def _framing_points(cache: VertexCache, way: root_path.RootPath | None) -> AnyArray:
+def _framing_points(cache: VertexCache, camera_path: root_path.RootPath | None) -> AnyArray:
     """Vertices of all frames relative to the camera; of long motions a subset of frames."""
     step = max(1, -(-cache.frame_count * cache.vertex_count // MAX_POINTS))
     found = []
     for chunk in cache.chunks():
         chosen = slice(-chunk.first % step, None, step)
         positions = chunk.positions[chosen].copy()
-        if way is not None:
+        if camera_path is not None:
             times = cache.times[chunk.first : chunk.first + len(chunk.positions)][chosen]
-            positions[..., [0, 2]] -= way.at(times)[:, None]
+            positions[..., [0, 2]] -= camera_path.at(times)[:, None]
         found.append(positions.reshape(-1, 3))
     return np.concatenate(found)

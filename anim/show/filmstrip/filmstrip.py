@@ -39,7 +39,7 @@ class Strip:
     """Row of a filmstrip. times: (F,) s. positions: (F, V, 3) m, Y up. faces, linear colors: (T, 3).
 
     distances: (F, V) m, shown as a heat map instead of the colors, or None. label: of the row, "dqs".
-    heading: above all rows of one clip, "Walk". way: root path for a camera that follows the figure.
+    heading: above all rows of one clip, "Walk". root_path: for a camera that follows the figure.
     rest: (V, 3) m, to which a checker is fixed. surface: materials; None for plain colors.
     clip: index of its clip; rows of one clip are consecutive.
     """
@@ -135,25 +135,25 @@ def _draw_row(
     row: Strip,
     frames: Iterator[Image],
     top: int,
-    place: tuple[int, int],
+    index_and_count: tuple[int, int],
     per_line: int,
     size: tuple[int, int],
 ) -> None:
-    """Draw the frames of a row below `top` pixels. place: index of the row, and number of rows."""
-    (r, count), (width, height) = place, size
+    """Draw the frames of a row below `top` pixels. index_and_count: of the row in its clip."""
+    (r, count), (width, height) = index_and_count, size
     columns, pitch = _columns(row, per_line)[0], _grid(width)[1]
     for f, frame in enumerate(frames):
         y = top + (f // columns * count + r) * (height + _footer(row))
         x = EDGE + f % columns * pitch + (pitch - GAP - width) // 2
         sheet[y : y + height, x : x + width] = frame
-        for i, words in enumerate(_render_moment(row, f)):
+        for i, words in enumerate(_frame_captions(row, f)):
             middle = x + (width - captions.width(words)) // 2
             captions.write(sheet, words, middle, y + height + GAP + i * LINE, color=FAINT)
         if row.label and f % columns == 0:
             captions.write(sheet, row.label, x + TEXT_INSET_PX, y + height - TEXT_HEIGHT_PX)
 
 
-def _render_moment(row: Strip, frame: int) -> list[str]:
+def _frame_captions(row: Strip, frame: int) -> list[str]:
     """Captions of a frame: time and, if the camera follows the figure, distance: "0.50 s", "1.2 m"."""
     time = f"{row.times[frame]:.2f} s"
     if row.root_path is None:
@@ -251,12 +251,12 @@ def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> I
         colors = row.colors
         if row.distances is not None:
             colors = palette.heat_colors(row.distances[f], row.faces, most)
-        seen, now = positions.astype(np.float64), scenery
+        vertices, view = positions.astype(np.float64), scenery
         if row.root_path is not None:
-            place = row.root_path.at(row.times[f])
-            seen[:, [0, 2]] -= place
-            now = translate_view(scenery, place, row.root_path.milestones(row.times[f], mark_spacing(scenery)))
-        picture = render_frame(now, seen, row.faces, colors, marks, row.surface, tinted=row.distances is None)
+            position = row.root_path.at(row.times[f])
+            vertices[:, [0, 2]] -= position
+            view = translate_view(scenery, position, row.root_path.milestones(row.times[f], mark_spacing(scenery)))
+        picture = render_frame(view, vertices, row.faces, colors, marks, row.surface, tinted=row.distances is None)
         yield to_srgb(picture)
 
 

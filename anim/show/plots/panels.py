@@ -91,10 +91,7 @@ def _angle(axes: Axes, each: PlotTrack) -> str:
 def _lock(axes: Axes, each: PlotTrack) -> str:
     """Draw the distance of an Euler order from gimbal lock, at most 90°, filled below 5°."""
     found = [gimbal_distance_line(track, order=each.view) for track in _tracks(each)]
-    for i, line in enumerate(found):
-        behind = len(found) > 1 and i == 0
-        look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
-        axes.plot(line.times, line.values[:, 0] * DEGREES, color=INK, **look)
+    _plot_lines(axes, found, DEGREES, INK)
     axes.set_ylim(0, 90 * 1.08)
     axes.set_yticks([0, 45, 90])
     axes.axhspan(0, NEAR_LOCK_DEG, color=COLORS[0], alpha=0.3, linewidth=0)
@@ -205,8 +202,8 @@ def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **l
         return
     colored = _colored(each)
     others = [c for c in range(line.values.shape[1]) if c not in colored]
-    still_first = sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c]))))
-    for c in (*others, *still_first):
+    by_range = sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c]))))
+    for c in (*others, *by_range):
         chosen = {"linewidth": 0.6, "alpha": 0.7, "zorder": 1.5} if c in others else look
         axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **chosen)
 
@@ -266,10 +263,14 @@ def _single(
     axes.set_ylim(0, top * 1.08 if top > 0 else 1)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=2, steps=list(steps)))
     panel_axes.plain(axes)
+    _plot_lines(axes, found, factor, color)
+    if len(found) == 1:
+        axes.fill_between(found[0].times, found[0].values[:, 0] * factor, 0, color=color, alpha=0.08, linewidth=0)
+
+
+def _plot_lines(axes: Axes, found: list[Polyline], factor: float, color: str) -> None:
+    """Draw one line, or two for a comparison: the first one wide and pale behind the other."""
     for i, line in enumerate(found):
-        behind = len(found) > 1 and i == 0
-        look = {"linewidth": BEHIND - 1, "alpha": PALE} if behind else {"linewidth": THIN}
-        values = line.values[:, 0] * factor
-        axes.plot(line.times, values, color=color, **look)
-        if len(found) == 1:
-            axes.fill_between(line.times, values, 0, color=color, alpha=0.08, linewidth=0)
+        is_behind = len(found) > 1 and i == 0
+        style = {"linewidth": BEHIND - 1, "alpha": PALE} if is_behind else {"linewidth": THIN}
+        axes.plot(line.times, line.values[:, 0] * factor, color=color, **style)

@@ -13,8 +13,6 @@ from anim.sampling.sample import sample
 from anim.simulation.cloth.colliders import Obstacle, place_obstacles
 from anim.skinning.bake import Baker
 
-MOVED_M = 1e-9  # a mesh that moves less is at rest
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClothDriver:

@@ -9,10 +9,24 @@ from numpy.typing import NDArray
 from anim.errors import RangeError
 from anim.simulation.comparison import compare_integrators
 from anim.simulation.integrators import INTEGRATORS, integrate
-from anim.simulation.mass_spring import MassSpring, oscillator, rope
+from anim.simulation.mass_spring import MassSpring, oscillator
 
 Array = NDArray[np.float64]
 G = 9.81
+
+
+def rope(num_points: int, length: float, mass: float, stiffness: float, angle: float) -> tuple[MassSpring, Array]:
+    """A rope of points pinned at its first, and its straight start (P, 3) at `angle` rad from hanging down.
+
+    length: m, mass: kg, of all. stiffness: N/m, of each spring between neighbors.
+    """
+    at = np.linspace(0, length, num_points)
+    x = np.stack([at * np.sin(angle), -at * np.cos(angle), np.zeros(num_points)], axis=1)
+    masses = np.full(num_points, mass / num_points)
+    masses[0] = np.inf
+    springs = np.stack([np.arange(num_points - 1), np.arange(1, num_points)], axis=1)
+    count = num_points - 1
+    return MassSpring(masses, springs, np.full(count, length / count), np.full(count, stiffness), np.zeros(count)), x
 
 
 def net(seed: int, damping: float = 0.3) -> tuple[MassSpring, Array, Array]:

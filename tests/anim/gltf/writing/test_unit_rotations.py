@@ -1,4 +1,4 @@
-"""Rotations off unit length: found in all tracks of a clip at once, as in one after the other."""
+"""Non-unit rotations: found in all tracks of a clip at once, as in one after the other."""
 
 from __future__ import annotations
 
