@@ -13,12 +13,14 @@
     anim.bake(asset, "walk", method="dqs", fps=24).save("walk.usdc")
     anim.diff("walk.glb", "small.glb").max_error   # m
     anim.sample(asset, "walk", fps=30)             # positions of all joints, (frames, nodes, 3)
+    anim.page(asset, "small.glb")                  # bytes of an HTML page; in notebooks assets show theirs
 
 Facade
     load, save              files and bytes ↔ Asset
     optimize, bake          fewer bytes within an error bound; skinning as a vertex cache
     diff                    distances between the motion of two assets
     sample, sample_poses    positions of joints; rotations, scales and matrices too
+    page                    one HTML file that plays an asset or a cache, or compares two
     Asset, Clip, Track, Skeleton, Scene, VertexCache    their arguments and results
     AnimError               base of all errors: FormatError, UnsupportedError, NotFoundError,
                             RangeError, ShapeError, OutputError
@@ -36,7 +38,7 @@ Packages, from the bottom up, each imported as anim.<package>.<module>
     skinning, caches        methods and bakes; .npz, .usdc, .pc2, .glb and other vertex caches
     optimization            fewest keys and bits within an error bound, verified
     simulation              particles, springs, cloth and rigid bodies, and the integrators behind them
-    show                    plots and filmstrips
+    show                    plots, filmstrips, pages
     check                   rules about files, their fixes, baselines and budgets
 
 Metres, seconds and radians; right-handed, Y up; quaternions (x, y, z, w). Arrays are read-only, so that values can be
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
     from anim.asset import Asset as Asset
     from anim.asset import load as load
     from anim.asset import save as save
+    from anim.asset_page import page as page
     from anim.caches.registry import CACHE_FORMATS as CACHE_FORMATS
     from anim.curves.easing.table import EASINGS as EASINGS
     from anim.curves.tangents.table import TANGENTS as TANGENTS
@@ -82,6 +85,7 @@ __version__ = "0.2.0"
 _MODULES = {  # modules of the names, imported on first use
     "anim.api": ("BakedCache", "OptimizeResult", "bake", "diff", "optimize", "sample", "sample_poses"),
     "anim.asset": ("Asset", "load", "save"),
+    "anim.asset_page": ("page",),
     "anim.caches.registry": ("CACHE_FORMATS",),
     "anim.curves.easing.table": ("EASINGS",),
     "anim.curves.tangents.table": ("TANGENTS",),

@@ -74,6 +74,13 @@ class BakedCache(VertexCache):
         values: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
         return partial(BakedCache, **values | {"chunks": partial(iter, (self.load_all(),))}), ()
 
+    def _repr_html_(self) -> str:
+        """Return the page that plays the cache, for notebooks."""
+        from anim.show.page import notebook
+        from anim.show.page.page import page
+
+        return notebook.frame(lambda: page(notebook.cache_file(self)), repr(self))
+
     def save(
         self,
         path: PathName,

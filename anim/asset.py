@@ -135,6 +135,13 @@ class Asset:
         """Write the asset, as `anim.save` does."""
         save(self, path)
 
+    def _repr_html_(self) -> str:
+        """Return the page that plays the asset, for notebooks."""
+        from anim.show.page import notebook
+        from anim.show.page.page import page
+
+        return notebook.frame(lambda: page(notebook.document_file(self._checked(), self.source)), repr(self))
+
     def __repr__(self) -> str:
         counts = ", ".join(
             f"{key}={len(json_array(self.document.json, key))}" for key in ("animations", "nodes", "meshes")
