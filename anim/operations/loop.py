@@ -59,9 +59,9 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, fram
     """Return the clip with its last `blend` seconds corrected to end as it starts, in value and speed.
 
     The correction is added to the motion: a cubic from 0 to the loop gap in value and speed; for rotations a rotation
-    vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks end with their first value.
-    Tracks not in `tracks` keep their end, for example of a traveling root. frame_rate: of the keys added in the blend,
-    from its start; None for even spacing.
+    vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks have their first value at
+    the end of the clip. Tracks not in `tracks` keep their end, for example of a traveling root. frame_rate: of the keys
+    added in the blend, from its start; None for even spacing.
     Raises RangeError unless 0 < blend ≤ the clip's duration.
     """
     chosen = track_indices(clip, tracks)
@@ -106,7 +106,7 @@ def _close(track: Track, clip: Clip, blend: float, frame_rate: float | None) -> 
     ends = np.array([clip.start, clip.end])
     first, last = sample(track, ends)
     if track.interpolation is Interpolation.STEP:
-        return replace(track, values=np.concatenate((track.values[:-1], first[None])))
+        return _close_step(track, clip.end, first)
     if len(track.times) > 2 and track.times[-2] > clip.end - min_interval(clip.end, MIN_INTERVAL_S):
         track = _without_last_jump(track)
         last = track.values[-1]
@@ -122,6 +122,15 @@ def _close(track: Track, clip: Clip, blend: float, frame_rate: float | None) -> 
     before_last = _closing_offset(track, _extrapolate(track, first, speed, -last_piece), sample(track, times[-2:-1])[0])
     slope = _end_slope(gap, before_last, blend, last_piece)
     return _correct_linear(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
+
+
+def _close_step(track: Track, end: float, first: Floats) -> Track:
+    """Return a STEP track with its first value at the end of the clip, which may be after its last key."""
+    if track.times[-1] > end - min_interval(end, MIN_INTERVAL_S):
+        return replace(track, values=np.concatenate((track.values[:-1], first[None])))
+    if (track.values[-1] == first).all():
+        return track
+    return track.with_keys(np.append(track.times, end), np.concatenate((track.values, first[None])))
 
 
 def _without_last_jump(track: Track) -> Track:

@@ -59,7 +59,7 @@ def diff_by_vertex(
         one, other = (stack.enter_context(_opened(path, voice, opened)) for path in (old, new))
         label, first, second = _motions(one, other, clips, voice)
         times = common_times(first, second, fps)
-        found = vertex_distance(times, first.frames(times), second.frames(times))
+        found = vertex_distance(times, first.frames(times), second.frames(times), diagonal=first.diagonal())
         mesh, vertex = vertex_motion.locate(first if first.labels else second, max(found.vertex, 0))
         return VertexReport((one.name, other.name), (one.size, other.size), label, found, mesh, vertex, fps)
 

@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats.flipbook_reader import read_pages
 from anim.caches.source_document.bake_source import BAKED_SUFFIX, baked_meshes
+from anim.caches.transforms import statistics
 from anim.caches.transforms.resample import resample_frames
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import RangeError
@@ -40,6 +41,13 @@ class VertexMotion:
             cache = bake(scene, clip, times=times, rigid=True, nodes=nodes)
         for chunk in cache.chunks():
             yield from chunk.positions[:, self.columns]
+
+    def diagonal(self) -> float:
+        """Return the size of the model in metres, at rest."""
+        if isinstance(self.source, VertexCache):
+            return statistics.diagonal(self.source)
+        scene, clip, nodes = self.source
+        return statistics.diagonal(bake(scene, clip, times=self.keys[:1], rigid=True, nodes=nodes))
 
 
 def pair_with_cache(

@@ -1,4 +1,4 @@
-"""Bounding box of the motion in a cache, and spacing of its frames."""
+"""Size of the model in a cache, and spacing of its frames."""
 
 from __future__ import annotations
 
@@ -10,22 +10,21 @@ from anim.model import VertexCache
 GRID_TOLERANCE_FRAMES = 1e-3  # fraction of a step by which a frame may deviate from the grid
 
 
-def bounds(cache: VertexCache) -> tuple[Floats, Floats]:
-    """Return the minimum and maximum x, y, z (3,) of all vertices of all frames; 0 without vertices.
-
-    The cache is read in one pass.
-    """
-    least, most = np.full(3, np.inf), np.full(3, -np.inf)
-    for chunk in cache.chunks():
-        least = np.minimum(least, chunk.positions.min(axis=(0, 1), initial=np.inf))
-        most = np.maximum(most, chunk.positions.max(axis=(0, 1), initial=-np.inf))
-    return (least, most) if (least <= most).all() else (np.zeros(3), np.zeros(3))
-
-
 def diagonal(cache: VertexCache) -> float:
-    """Return the diagonal of the bounding box of the whole motion, in metres."""
-    least, most = bounds(cache)
-    return float(np.linalg.norm(most - least))
+    """Return the size of the model in metres: the diagonal of the bounding box of its rest pose.
+
+    Without a rest pose, the largest diagonal of a frame. A figure that travels is as large as one that does not.
+    """
+    if cache.rest is not None and len(cache.rest):
+        size = float(np.linalg.norm(np.ptp(np.asarray(cache.rest, np.float64), axis=0)))
+        if size > 0:
+            return size
+    largest = 0.0
+    for chunk in cache.chunks():
+        if chunk.positions.shape[1]:
+            spans = np.ptp(chunk.positions, axis=1).astype(np.float64)
+            largest = max(largest, float(np.linalg.norm(spans, axis=1).max(initial=0.0)))
+    return largest
 
 
 def frame_spacing(times: Floats) -> tuple[float, Floats]:

@@ -17,7 +17,7 @@ MAX_SAMPLES = 16_000_000  # maximum number of vertices × frames for p99
 class VertexDistance:
     """Distances in m. max_error at vertex and time (s); mean over all vertices and frames, p99 over up to MAX_SAMPLES.
 
-    diagonal: of the first motion's bounding box. frames: number of compared times.
+    diagonal: size of the first model. frames: number of compared times.
     """
 
     max_error: float
@@ -29,13 +29,14 @@ class VertexDistance:
     frames: int
 
 
-def vertex_distance(times: Floats, old: Iterable[AnyArray], new: Iterable[AnyArray]) -> VertexDistance:
+def vertex_distance(
+    times: Floats, old: Iterable[AnyArray], new: Iterable[AnyArray], *, diagonal: float
+) -> VertexDistance:
     """Return the distances of frames (V, 3) of two motions at `times` (F,). Raises ShapeError for other vertex counts.
 
-    The frames are read once, one at a time.
+    The frames are read once, one at a time. diagonal: m, of the first model's rest pose.
     """
     worst, time, vertex, total, count = 0.0, float(times[0]), -1, 0.0, 0
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
     samples: list[AnyArray] = []
     for at, first, second in zip(times.tolist(), old, new, strict=True):
         if first.shape != second.shape:
@@ -45,9 +46,7 @@ def vertex_distance(times: Floats, old: Iterable[AnyArray], new: Iterable[AnyArr
         if distance[far] > worst:
             worst, time, vertex = float(distance[far]), at, far
         total, count = total + float(distance.sum()), count + len(distance)
-        low, high = np.minimum(low, first.min(axis=0)), np.maximum(high, first.max(axis=0))
         step = max(1, len(times) * len(distance) // MAX_SAMPLES)
         samples.append(distance[::step].astype(np.float32))
     p99 = float(np.percentile(np.concatenate(samples), 99)) if samples else 0.0
-    diagonal = float(np.linalg.norm(high - low))
     return VertexDistance(worst, time, vertex, total / max(count, 1), min(p99, worst), diagonal, len(samples))

@@ -21,7 +21,8 @@ from anim.operations.trim import trim
 from anim.sampling.derivatives import rates
 from anim.sampling.track import sample
 from tests.anim.operations.tracks import TRACKS
-from tests.clips import LINEAR, about, track
+from tests.clips import LINEAR, STEP, about, track
+from tests.clips import clip as clip_of
 from tests.files import opened
 
 
@@ -193,3 +194,14 @@ def test_a_wheel_turns_on_in_the_appended_frame() -> None:
     half = np.radians(345) / 2
     shown = sample(closed, np.array([11.5 / 12]))[0]
     np.testing.assert_allclose(np.abs(shown @ [np.sin(half), 0, 0, np.cos(half)]), 1, atol=1e-6)
+
+
+def test_step_tracks_that_end_early_keep_their_last_value_until_the_end() -> None:
+    held = track("translation", [0, 0.25, 0.5], np.outer([0, 1, 2], [1, 0, 0]), STEP)
+    closed = track("scale", [0, 0.25, 0.5], np.outer([1, 2, 1], [1, 1, 1]), STEP)
+    last = track("translation", [0, 1], np.outer([0, 3], [1, 0, 0]), STEP, node=1)
+    clip = loop(clip_of(held, closed, last), blend=0.2)
+    assert clip.tracks[0].times.tolist() == [0, 0.25, 0.5, 1]
+    assert clip.tracks[0].values[:, 0].tolist() == [0, 1, 2, 0]
+    assert clip.tracks[1].times.tolist() == [0, 0.25, 0.5]
+    assert clip.tracks[2].values[:, 0].tolist() == [0, 0]

@@ -11,6 +11,7 @@ from anim.caches.transforms.resample import at_rate, at_time, resample_frames
 from anim.caches.transforms.vertex_order import reorder
 from anim.errors import FormatError, RangeError, UnsupportedError
 from anim.model import MeshPart
+from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import cache, positions_of, written
 
 
@@ -62,10 +63,14 @@ def test_blenders_order_keeps_points() -> None:
     assert reorder(points, "blender").vertex_count == 9
 
 
-def test_bounds() -> None:
-    low, high = statistics.bounds(cache())
-    assert low == pytest.approx(positions_of(cache()).min(axis=(0, 1)))
-    assert statistics.diagonal(cache()) == pytest.approx(np.linalg.norm(high - low))
+def test_the_size_of_a_model_is_that_of_its_rest_pose_however_far_it_travels() -> None:
+    box = np.array([[0.0, 0, 0], [1, 2, 2]])
+    far = np.stack([box, 0.5 * box + [100, 0, 0]]).astype(np.float32)
+    faces = np.empty((0, 3), np.int64)
+    assert statistics.diagonal(from_arrays(np.array([0.0, 1]), far, faces)) == pytest.approx(3)
+    assert statistics.diagonal(from_arrays(np.array([0.0, 1]), far, faces, rest=2 * box)) == pytest.approx(6)
+    collapsed = from_arrays(np.array([0.0, 1]), far, faces, rest=0 * box)
+    assert statistics.diagonal(collapsed) == pytest.approx(3)
 
 
 @pytest.mark.parametrize("ending", [".npz", ".pc2", ".mdd", ".usdc", ".usda", ".glb"])
