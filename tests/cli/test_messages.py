@@ -94,14 +94,14 @@ def test_where_and_help_are_shown_on_one_line_each(capsys: pytest.CaptureFixture
         (["resample", "--fsp", "3"], "resample: no such option: --fsp", "did you mean '--fps'"),
         (["inspect", "--forma", "json"], "inspect: no such option: --forma", "did you mean '--format'?"),
         (["inspect", "--zzz"], "inspect: no such option: --zzz", "gltf-anim inspect --help"),
-        (["convert", "-o", "x.glb"], "convert: no such option: -o", "IN OUT"),
+        (["loop", "-o", "x.glb"], "loop: no such option: -o", "IN OUT"),
         (["inspect", "-o", "x.glb"], "inspect: no such option: -o", "gltf-anim inspect --help"),
         (["resample"], "resample: missing option '--fps'", "gltf-anim resample --help"),
         (["resample", "--fps"], "resample: option '--fps' requires an argument", "gltf-anim resample --help"),
         (["resample", "--fps", "abc"], "invalid value for '--fps': 'abc' is no number", "gltf-anim resample --help"),
         (["resample", "--fps", "inf"], "'inf' is no finite number", "gltf-anim resample --help"),
         (["convert", "--quiet=3"], "option '--quiet' does not take a value", "gltf-anim convert --help"),
-        (["convert", "a", "b", "c"], "convert: got unexpected extra argument(s) (c)", "gltf-anim convert --help"),
+        (["loop", "a", "b", "c"], "loop: got unexpected extra argument(s) (c)", "gltf-anim loop --help"),
         (["inspect", "--format", "jason"], "'jason' is none of text, json, csv", "did you mean 'json'?"),
         (["inspect", "--format", "xml"], "'xml' is none of text, json, csv", "gltf-anim inspect --help"),
         (
@@ -202,7 +202,7 @@ def test_inputs_that_cannot_be_read_are_3(call: Call, tmp_path: Path) -> None:
         lost = tmp_path / "lost.glb"
         assert refusal(call(name, lost, *rest), 3) == f"gltf-anim: {lost}: can't be read (no such file or directory)"
         if name != "inspect":  # which looks for files in folders
-            code = 2 if name == "resample" else 3  # it takes folders, with --out
+            code = 3 if name == "sample" else 2  # they take folders, with --out
             assert f"{tmp_path}: is a folder" in refusal(call(name, tmp_path, *rest), code)
         assert "'': is a folder" in refusal(call(name, "", *rest), 3)
         assert refusal(call(name, "-", *rest), 3) == "gltf-anim: stdin: is empty (expected glTF)"
