@@ -109,11 +109,6 @@ def at_keys(track: Track) -> KeyJumps:
     return _Analysis(track).at_keys()
 
 
-def loop_gap(track: Track, *, start: float, end: float) -> LoopGap:
-    """Return the continuity of a loop from `end` back to `start`, in seconds."""
-    return _Analysis(track).seam(start, end)
-
-
 def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
     analysis = _Analysis(track)
     keys = analysis.at_keys()
@@ -124,7 +119,7 @@ def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
         path=track.path,
         interpolation=str(track.interpolation),
         unit="rad" if track.kind is ValueKind.ROTATION else UNITS.get(track.path, "1"),
-        still=analysis.still,
+        still=analysis.is_constant,
         interior_keys=len(keys.times),
         jumps=count[ContinuityClass.JUMP],
         c0=count[ContinuityClass.C0],
@@ -134,7 +129,7 @@ def _track(track: Track, clip: Clip, skeleton: Skeleton) -> TrackContinuity:
         largest_value_jump=_max_jump(keys, keys.value, {ContinuityClass.JUMP}),
         largest_speed_jump=_max_jump(keys, keys.speed, {ContinuityClass.JUMP, ContinuityClass.C0, ContinuityClass.G1}),
         largest_acceleration_jump=_max_jump(keys, keys.acceleration, set(ContinuityClass) - {ContinuityClass.C2}),
-        seam=None if analysis.still else analysis.seam(clip.start, clip.end),
+        seam=None if analysis.is_constant else analysis.loop_gap(clip.start, clip.end),
         keys=keys,
     )
 
@@ -153,8 +148,8 @@ class _Analysis:
 
     def __init__(self, track: Track) -> None:
         self.track = track
-        self.still = _is_constant(track)
-        self._speed, self._acceleration = (0.0, 0.0) if self.still else knots.root_mean_squares(track)
+        self.is_constant = _is_constant(track)
+        self._speed, self._acceleration = (0.0, 0.0) if self.is_constant else knots.root_mean_squares(track)
         self._size = float(np.abs(track.values).max())
         storage = track.storage
         integer_step = INTEGER_STEPS.get(storage.component_type, 1.0)
@@ -163,12 +158,12 @@ class _Analysis:
 
     def at_keys(self) -> KeyJumps:
         """The jumps at the interior keys; two keys that represent a jump are one, at the time of the second."""
-        if self.still:
+        if self.is_constant:
             none = np.zeros(max(len(self.track.times) - 2, 0))
             return KeyJumps(self.track.times[1:-1], (ContinuityClass.C2,) * len(none), none, none, none)
         return self._graded(knots.interior_knots(self.track), 0.0)
 
-    def seam(self, start: float, end: float) -> LoopGap:
+    def loop_gap(self, start: float, end: float) -> LoopGap:
         """The jump from the clip's end to its start; of the two of a STEP track the larger one."""
         found = self._graded(knots.loop_knot(self.track, start=start, end=end), CLOSED_GAP_PER_RANGE * self._range())
         worst = int(found.value.argmax())
@@ -187,11 +182,11 @@ class _Analysis:
         grades = np.full(len(value), str(ContinuityClass.C2), dtype="U4")
         grades[acceleration > JUMP_TOLERANCE * self._acceleration + self._acceleration_noise(at)] = ContinuityClass.C1
         grades[speed > allowed_speed] = ContinuityClass.C0
-        grades[(speed > allowed_speed) & self._goes_on(at, allowed_speed)] = ContinuityClass.G1
+        grades[(speed > allowed_speed) & self._is_continued(at, allowed_speed)] = ContinuityClass.G1
         grades[value > allowed + self._value_noise(at)] = ContinuityClass.JUMP
         return KeyJumps(at.times, tuple(ContinuityClass(str(each)) for each in grades), value, speed, acceleration)
 
-    def _goes_on(self, at: Knots, allowed_speed: Floats) -> Bools:
+    def _is_continued(self, at: Knots, allowed_speed: Floats) -> Bools:
         """Mask of knots where the track moves on both sides in one direction; weights and scalars have none."""
         if self.track.path == "weights" or self.track.values.shape[1] == 1:
             return np.zeros(len(at.times), np.bool_)
@@ -205,17 +200,17 @@ class _Analysis:
 
     def _value_noise(self, at: Knots) -> Floats:
         """Difference of values on both sides of two keys without a jump: rounding, and motion between them."""
-        going = np.maximum(*(lengths(rates) for rates in at.rates))
-        return np.asarray(8 * FLOAT32_SPACING * self._size + 2 * (MAX_JUMP_S + 2 * self._late) * going)
+        speed = np.maximum(*(lengths(rates) for rates in at.rates))
+        return np.asarray(8 * FLOAT32_SPACING * self._size + 2 * (MAX_JUMP_S + 2 * self._late) * speed)
 
     def _speed_noise(self, at: Knots) -> Floats:
         """Uncertainty of velocities from the rounding of values and times, for LINEAR; tangents are stored."""
         noise = np.zeros(len(at.times))
         for rates, h in zip(at.rates, at.durations, strict=True):
-            going = lengths(rates)
-            noise += 8 * FLOAT32_SPACING * going
+            speed = lengths(rates)
+            noise += 8 * FLOAT32_SPACING * speed
             if self.track.interpolation is Interpolation.LINEAR:
-                noise += (4 * self._step + 2 * self._late * going) / h
+                noise += (4 * self._step + 2 * self._late * speed) / h
         return noise
 
     def _acceleration_noise(self, at: Knots) -> Floats:
@@ -223,9 +218,9 @@ class _Analysis:
         noise = np.zeros(len(at.times))
         if self.track.interpolation is not Interpolation.CUBICSPLINE:
             return noise
-        for rates, pulls, h in zip(at.rates, at.accelerations, at.durations, strict=True):
-            off = FLOAT32_SPACING + self._late / h
-            noise += 12 * self._step / h**2 + off * (12 * lengths(rates) / h + 4 * lengths(pulls))
+        for rates, accelerations, h in zip(at.rates, at.accelerations, at.durations, strict=True):
+            relative = FLOAT32_SPACING + self._late / h
+            noise += 12 * self._step / h**2 + relative * (12 * lengths(rates) / h + 4 * lengths(accelerations))
         return noise
 
     def _range(self) -> float:
