@@ -98,6 +98,14 @@ def test_an_address_without_a_scheduler_is_refused(crowd: Path, call: Call, monk
     )
 
 
+@needs_dask
+@pytest.mark.parametrize("address", ["slurm:16", "k8s://pods", "PBS"])
+def test_queues_are_no_addresses(address: str, crowd: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That waited for ten seconds, and named a host."""
+    monkeypatch.chdir(crowd)
+    assert f"--scheduler {address}: {address[:3].lower()}" in refusal(call("run", "--scheduler", address), 2)
+
+
 def test_without_dask_the_extra_is_named(crowd: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(crowd)
     monkeypatch.setitem(sys.modules, "distributed", None)

@@ -12,6 +12,7 @@ from anim.errors import UnsupportedError
 from cli.errors import UsageError
 
 MAX_CONNECT_S = 10
+QUEUES = ("slurm", "pbs", "sge", "lsf", "oar", "htcondor", "kubernetes", "k8s")  # whose own tools start workers
 MIN_JOBS_AT_A_TIME = 64  # waiting jobs are what an adaptive cluster grows by
 
 
@@ -39,6 +40,11 @@ def connect_cluster(address: str) -> Iterator[Cluster]:
     except ImportError:
         problem = "--scheduler needs the package distributed"
         raise UnsupportedError(problem, help="pip install 'gltf-anim[cluster]'") from None
+    if system := next((each for each in QUEUES if address.lower().startswith(each)), ""):
+        raise UsageError(
+            f"--scheduler {address}: {system} starts dask's workers, it is no address of a scheduler",
+            help="srun, or SLURMCluster of dask-jobqueue: see Clusters in docs/recipes.md",
+        )
     named = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
     try:
         client = Client(**named, timeout=MAX_CONNECT_S, set_as_default=False)
