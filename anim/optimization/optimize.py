@@ -76,7 +76,7 @@ def optimize(
         return reader.clip_label(clips[item[0]].name, item[0])
 
     with process_pool(min(workers, len(tasks)), optimizer, start=start) as pool:
-        results = pool.each(optimize_clip, tasks, label=name)
+        results = pool.each(optimize_clip, tasks, label=name, work=lambda item: _work(item[1].clip))
         for (number, _), each in zip(tasks, results, strict=True):
             solutions[number], verdicts[number] = each.solution, each.verdict
             without_loss += [number] if each.without_loss else []
@@ -84,7 +84,9 @@ def optimize(
         lossy = {i: each for i, each in solutions.items() if i not in without_loss}
         slimmer = drop_redundant_keys(lossy, optimizer.after.skeleton, request)
         items = [(i, each.clip) for i, each in slimmer.items()]
-        for (number, _), found in zip(items, pool.each(verify_solution, items, label=name), strict=True):
+        for (number, _), found in zip(
+            items, pool.each(verify_solution, items, label=name, work=lambda item: _work(item[1])), strict=True
+        ):
             if found.holds:
                 solutions[number], verdicts[number] = slimmer[number], found
     new = write_solutions(base.document if base else document, solutions, request.packing)
@@ -93,6 +95,11 @@ def optimize(
         verdicts[number] = optimizer.verify(number, read_back[number])
     done = writing.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
+
+
+def _work(clip: Clip) -> float:
+    """Estimate of the work on a clip: the number of its values."""
+    return float(sum(track.values.size for track in clip.tracks))
 
 
 def _visible_clips(request: Request, scene: Scene) -> Request:

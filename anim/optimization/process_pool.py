@@ -6,18 +6,18 @@ a pipe would block the parent for ever if the process ends before it reads.
 
 from __future__ import annotations
 
-import multiprocessing
 import pickle
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from anim.errors import UnsupportedError, not_written
-from anim.worker_processes import Lifeline, follow_parent, open_lifeline
+
+if TYPE_CHECKING:  # several modules of the standard library, which one process does not need
+    from concurrent.futures import Future, ProcessPoolExecutor
+
+    from anim.worker_processes import Lifeline
 
 Result = TypeVar("Result")
 
@@ -30,24 +30,32 @@ class ProcessPool:
         self._started: Future[None] | None = None  # done once a process has started
 
     def each(
-        self, function: Callable[[Any, Any], Result], tasks: Sequence[Any], *, label: Callable[[Any], str]
+        self,
+        function: Callable[[Any, Any], Result],
+        tasks: Sequence[Any],
+        *,
+        label: Callable[[Any], str],
+        work: Callable[[Any], float] = lambda _: 0.0,
     ) -> Iterator[Result]:
-        """Yield function(shared, task) for every task, in order.
+        """Yield function(shared, task) for every task, in order; tasks with the most work start first.
 
-        label: name of a task for errors. Raises UnsupportedError if a process ended before its work did, as the system
-        ends one when memory runs out, or at its start.
+        label: name of a task for errors. work: estimate, in any unit. Raises UnsupportedError if a process ended before
+        its work did, as the system ends one when memory runs out, or at its start.
         """
         if self._pool is None or not tasks:
             yield from (function(self._shared, task) for task in tasks)
             return
+        from concurrent.futures.process import BrokenProcessPool
+
         try:
             self._started = self._started or self._pool.submit(_start)
-            futures = [self._pool.submit(_run, function, task) for task in tasks]
+            order = sorted(range(len(tasks)), key=lambda i: -work(tasks[i]))
+            futures = {i: self._pool.submit(_run, function, tasks[i]) for i in order}
         except BrokenProcessPool:
             raise self._broken(label(tasks[0])) from None
-        for future, task in zip(futures, tasks, strict=True):
+        for i, task in enumerate(tasks):
             try:
-                result = future.result()
+                result = futures[i].result()
             except BrokenProcessPool:
                 raise self._broken(label(task)) from None
             yield result
@@ -76,6 +84,11 @@ def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator
     if workers <= 1:
         yield ProcessPool(None, shared)
         return
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    from anim.worker_processes import open_lifeline
+
     context = multiprocessing.get_context(start)
     with _as_file(shared) as path, ExitStack() as stack:
         lifeline = stack.enter_context(open_lifeline(context, start))
@@ -91,6 +104,8 @@ def process_pool(workers: int, shared: Any, *, start: str = "spawn") -> Iterator
 @contextmanager
 def _as_file(shared: Any) -> Iterator[str]:
     """Yield the path of a temporary file with the pickled value."""
+    import tempfile
+
     with ExitStack() as stack:
         try:
             path = Path(stack.enter_context(tempfile.TemporaryDirectory()), "shared")
@@ -105,6 +120,8 @@ _run_in_worker: list[Any] = []  # the shared value of a worker process; set once
 
 
 def _set_up(path: str, lifeline: Lifeline) -> None:
+    from anim.worker_processes import follow_parent
+
     follow_parent(lifeline)
     with Path(path).open("rb") as file:
         _run_in_worker[:] = [pickle.load(file)]

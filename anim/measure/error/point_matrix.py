@@ -143,7 +143,7 @@ def extreme_vertices(surface: Surface) -> set[int]:
     chosen: set[int] = set()
     most = surface.joints[np.arange(len(surface.points)), surface.weights.argmax(axis=1)]
     noticed = surface.weights > CARRIED
-    for joint in np.unique(surface.joints[surface.weights > 0]).tolist():
+    for joint in sorted(set(surface.joints[surface.weights > 0].tolist())):
         here = ((surface.joints == joint) & noticed).any(axis=1)
         for mine in (np.flatnonzero(most == joint), np.flatnonzero(here)):
             if len(mine):

@@ -66,7 +66,7 @@ def statistics(
     times = dense_times(before, after, fps=fps) if times is None else times
     vertices = sum(len(group) for part in ruler.parts for group in part.groups)
     count = int(np.clip(MAX_SAMPLES // max(vertices, 1), 2, FRAMES))
-    chosen = np.unique(np.linspace(0, len(times) - 1, count).round().astype(np.int64))
+    chosen = np.array(sorted(set(np.linspace(0, len(times) - 1, count).round().astype(np.int64).tolist())))
     found: list[Floats] = []
     for block in ruler.blocks(before, after, times[chosen], player=player):
         found += _distances(ruler, block)

@@ -62,7 +62,7 @@ class ParentCompensation:
         world = np.empty_like(rotation)
         for level, above in self._descending(world):
             axis_of = on[level.tracks]
-            for number in np.unique(axis_of[axis_of >= 0]).tolist():
+            for number in sorted(set(axis_of[axis_of >= 0].tolist())):
                 here = np.flatnonzero(axis_of == number)
                 nodes, members = level.nodes[here], level.tracks[here].tolist()
                 found = self._candidates.compensated(

@@ -172,7 +172,12 @@ def _source_keys(track: Track, grid: Floats) -> Bools:
     """Mask of the grid (K,) at the track's keys; all for splines."""
     if track.interpolation is Interpolation.CUBICSPLINE:
         return np.ones(len(grid), np.bool_)
-    return np.asarray(np.isin(grid, times.key_times(track.times)))
+    keys = times.key_times(track.times)
+    keys = keys[(keys >= grid[0]) & (keys <= grid[-1])]
+    found = np.zeros(len(grid), np.bool_)
+    at = np.searchsorted(grid, keys)
+    found[at[grid[at] == keys]] = True
+    return found
 
 
 def _source_track(

@@ -78,6 +78,8 @@ class TimeAxisSearch:
         self._tabled = np.flatnonzero(moved > CONSTANT_TOLERANCE * bound)
         if not fits(len(self._tabled), source.grid):
             self._tabled = np.empty(0, np.int64)
+        self._is_tabled = np.zeros(len(moved), np.bool_)
+        self._is_tabled[self._tabled] = True
         self._segments = SegmentErrors(self._scaled[self._tabled], source.grid, MAX_BUDGET_PER_BOUND * bound)
         self._rows: dict[tuple[int, float], Bools] = {}
 
@@ -101,7 +103,7 @@ class TimeAxisSearch:
     def _search(self, keyed: Ints, budgets: Floats) -> Bools:
         """The same without the cache: from the table for the tracks in it, else by a new search."""
         rows = np.searchsorted(self._tabled, keyed)
-        there = np.isin(keyed, self._tabled)
+        there = self._is_tabled[keyed]
         found = np.zeros((len(keyed), len(self.grid)), np.bool_)
         if there.any():
             found[there] = self._segments.greedy_keys(rows[there], budgets[keyed[there]])

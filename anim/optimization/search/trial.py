@@ -204,7 +204,7 @@ class BoundUsage:
         self._rows = points.rows()
         self._allowed = allowed
         self._local = local_matrices(skeleton, source.local)
-        self._changing = np.unique([each.node for each in source.moving]).astype(np.int64)
+        self._changing = np.array(sorted({each.node for each in source.moving}), np.int64)
         self._nodes = np.array([each.node for each in source.moving], np.int64)
         self._turning = np.array([each.path == "rotation" for each in source.moving], np.bool_)
 

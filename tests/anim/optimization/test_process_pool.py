@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -70,3 +71,19 @@ def test_a_script_without_a_main_guard_gets_an_error_that_names_it(tmp_path: Pat
     assert run.returncode == 0, run.stderr
     assert "ended at their start" in run.stdout
     assert '`if __name__ == "__main__":`' in run.stdout
+
+
+def _started(_: object, task: int) -> tuple[int, int]:
+    return task, time.perf_counter_ns()
+
+
+def test_the_most_work_starts_first_and_results_keep_the_order() -> None:
+    with process_pool(2, None) as workforce:
+        found = list(workforce.each(_started, range(8), label=str, work=float))
+    assert [task for task, _ in found] == list(range(8))
+    assert found[7][1] < found[0][1]
+
+
+def test_one_process_imports_no_multiprocessing() -> None:
+    code = "import sys, anim.optimization.optimize; sys.exit('concurrent.futures.process' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
