@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.caches.formats import alembic, gltf, mdd, mesh_sequence, npz, pc2, usd_reader, usd_writer
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.signatures import Signature, is_mdd, is_npz, is_obj, is_stl, is_usdz, starts_with
+from anim.caches.signatures import Signature, is_gltf, is_mdd, is_npz, is_obj, is_stl, is_usdz, starts_with
 from anim.caches.storage import Inputs, Outputs
 from anim.caches.vat import reader, writer
 from anim.errors import AnimError, FormatError, RangeError, ShapeError, UnsupportedError
@@ -55,6 +55,7 @@ class CacheFormat:
 NORMALS = frozenset(("normals",))
 BOTH = frozenset(("normals", "tangents"))
 RATE = frozenset(("input_fps",))
+GLTF_OPTIONS = frozenset(("input_fps", "max_error", "quantize", "layout", "max_targets", "source"))
 
 
 def _frames(ending: str, about: str, begins: Signature, *, holds: frozenset[str] = NORMALS) -> CacheFormat:
@@ -101,8 +102,17 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         gltf.read,
         gltf.write,
         starts_with(b"glTF"),
-        frozenset(("input_fps", "max_error", "quantize", "layout", "max_targets", "source")),
+        GLTF_OPTIONS,
         BOTH,
+    ),
+    ".gltf": CacheFormat(
+        "glTF as text, with a .bin",
+        gltf.read,
+        gltf.write_with_buffers,
+        is_gltf,
+        GLTF_OPTIONS,
+        BOTH,
+        Files.SEVERAL,
     ),
     ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", b"\x76\x2f\x31\x01", "preset", "depth"),
     ".png": _texture(".png", "vertex animation texture, 16 bit", b"\x89PNG\r\n\x1a\n", "preset"),

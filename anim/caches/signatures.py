@@ -22,6 +22,11 @@ def is_usdz(head: bytes, size: int) -> bool:
     return head.startswith(b"PK") and name.endswith((b".usd", b".usda", b".usdc"))
 
 
+def is_gltf(head: bytes, size: int) -> bool:
+    """Return whether a file is glTF as text: JSON with a version in its first bytes."""
+    return head.lstrip().startswith(b"{") and b'"asset"' in head and b'"version"' in head
+
+
 def is_npz(head: bytes, size: int) -> bool:
     """Return whether a file is any other archive."""
     return head.startswith(b"PK") and not is_usdz(head, size)

@@ -28,7 +28,14 @@ from cli.reports import bake_notes
 from cli.reports.bake_report import BakedFile, report_notes, report_written, summarize_files
 from cli.reports.rotation_notes import normalized_keys_note
 from cli.text import Reporter
-from cli.workflows.bake_clip import BakeOptions, default_directions, keeps_materials, keeps_nodes, source_options
+from cli.workflows.bake_clip import (
+    BakeOptions,
+    Output,
+    default_directions,
+    keeps_materials,
+    keeps_nodes,
+    source_options,
+)
 from cli.workflows.bake_jobs import PLACEHOLDERS, bake_jobs, mesh_groups
 
 LBS = Method("lbs")
@@ -104,7 +111,7 @@ def command(
     than the model's size. For joints with non-uniform scale, tools define all methods except lbs differently: here each
     joint first scales the mesh about its own position, then rotates it.
 
-    A .glb is the source file with other vertices: its materials, images, texture coordinates, colors, extras and
+    A .glb or .gltf is the source file with other vertices: its materials, images, texture coordinates, colors, extras and
     extensions stay, and so do unskinned meshes, cameras and lights with their channels. Skins and the channels of
     joints are left out, or stay with --keep-skeleton; so are meshes that --mesh does not select, and other clips.
     USD has the materials as UsdPreviewSurface; their images are in a .usdz, and beside a .usdc or .usda.
@@ -177,7 +184,13 @@ def command(
             baked = made[job.group].bake(each, times=times, progress=progress) if measured is None else measured.cache
             cache = _turned(baked, up, vertex_order)
             looks = source_options(
-                source, ending, options, scene, groups[job.group][1], (job.clip, each), keep_skeleton=keep_skeleton
+                source,
+                options,
+                scene,
+                groups[job.group][1],
+                (job.clip, each),
+                keep_skeleton=keep_skeleton,
+                output=Output(job.file, ending, dry_run),
             )
             try:
                 meters = _meters(max_error, cache)

@@ -20,7 +20,7 @@ from cli.errors import UsageError
 from cli.io import cache_files, documents
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
-from cli.workflows.bake_clip import choose_clip, onto_source
+from cli.workflows.bake_clip import Output, choose_clip, onto_source
 
 Cache = Annotated[
     str,
@@ -106,7 +106,7 @@ def command(
         loaded = stack.enter_context(cache_files.load(input, ReadOptions(input_fps)))
         if input_fps and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--input-fps does not apply to {loaded.ending}, which stores its frame times")
-        if loaded.ending == ".glb":
+        if loaded.ending in (".glb", ".gltf"):
             announce_compiling(voice)
         cache = _changed(loaded.cache, at, fps, up, vertex_order)
         if max_error is not None:
@@ -114,7 +114,9 @@ def command(
         if onto is not None:
             source = stack.enter_context(documents.source(onto, voice))
             number = choose_clip(source, clip)
-            cache, given["source"] = onto_source(cache, source, number, ending, keep_skeleton=keep_skeleton)
+            cache, given["source"] = onto_source(
+                cache, source, number, keep_skeleton=keep_skeleton, output=Output(output, ending, dry_run)
+            )
         writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
         try:

@@ -213,7 +213,7 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
 
     voice: reports the notes of readers.
     """
-    if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
+    if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) not in (".glb", ".gltf"):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
                 voice.warn(words)

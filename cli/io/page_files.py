@@ -30,7 +30,7 @@ def open_page_file(path: str, voice: Reporter) -> PageFile:
     if of_path(path) is not None:
         with documents.content(path, ending=suffix(path)) as (data, name):
             return _converted(read_curves(data.tobytes(), name=PurePath(name).name), name, len(data))
-    if suffix(path) in CACHE_FORMATS and suffix(path) != ".glb":
+    if suffix(path) in CACHE_FORMATS and suffix(path) not in (".glb", ".gltf"):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
                 voice.warn(words)

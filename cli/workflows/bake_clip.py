@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from anim.caches.source_document.bake_source import BakeSource, baked_meshes
 from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_tangents
 from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.errors import RangeError
+from anim.files import resolver
 from anim.gltf.document import Document
 from anim.gltf.io import images
 from anim.gltf.io.source import Source
@@ -25,6 +27,14 @@ from anim.operations.selection import Selection
 from anim.operations.trim import trim
 from anim.sampling.times import frame_times
 from anim.skinning.bake import Baker, bakeable_instances, prepare_bake
+
+
+class Output(NamedTuple):
+    """An output file, the file extension of its format, and whether it is only tried."""
+
+    path: str
+    ending: str
+    dry_run: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,23 +109,23 @@ def keeps_nodes(ending: str) -> bool:
 
 def source_options(
     source: Source,
-    ending: str,
     options: BakeOptions,
     scene: Scene,
     nodes: Sequence[int] | None,
     clip: tuple[int | None, Clip],
     *,
     keep_skeleton: bool,
+    output: Output,
 ) -> Mapping[str, Any]:
     """Return the write option `source` of a format that keeps materials; else none.
 
     nodes: of the baked meshes; None for all. Other meshes are then left out. clip: its index, and the clip.
     """
-    if not keeps_materials(ending):
+    if not keeps_materials(output.ending):
         return {}
     baked = {each.node for each in bakeable_instances(scene, rigid=options.rigid, nodes=nodes)}
     left_out = frozenset(() if nodes is None else {each.node for each in scene.instances} - baked)
-    document = self_contained(source, {source.document.json["nodes"][node]["mesh"] for node in baked})
+    document = prepare_source(source, {source.document.json["nodes"][node]["mesh"] for node in baked}, output)
     number, played = clip
     if number is not None and (options.start, options.end) != (None, None) and played.end > played.start:
         document = writer.replace_clips(document, {number: trim(played, start=options.start, end=options.end)})
@@ -123,14 +133,19 @@ def source_options(
 
 
 def onto_source(
-    cache: VertexCache, source: Source, clip: int | None, ending: str, *, keep_skeleton: bool = False
+    cache: VertexCache,
+    source: Source,
+    clip: int | None,
+    *,
+    output: Output,
+    keep_skeleton: bool = False,
 ) -> tuple[VertexCache, BakeSource]:
     """Return a cache in world space with normals if the source is lit, and the source.
 
     clip: index of its clip. Raises RangeError for vertices that do not fit.
     """
-    document = self_contained(source, {each.mesh for each in baked_meshes(cache, source.document)})
-    if "tangents" in CACHE_FORMATS[ending].holds:
+    document = prepare_source(source, {each.mesh for each in baked_meshes(cache, source.document)}, output)
+    if "tangents" in CACHE_FORMATS[output.ending].holds:
         cache = with_shading_normals(cache, document)
     return cache, BakeSource(document, clip, keep_skeleton=keep_skeleton)
 
@@ -140,6 +155,22 @@ def choose_clip(source: Source, globs: Sequence[str] | None) -> int | None:
     names = reader.names(source.document)
     chosen = Selection(globs).chosen_clips(names) if globs else range(len(names))
     return chosen[0] if len(chosen) == 1 else None
+
+
+def prepare_source(source: Source, meshes: set[int], output: Output) -> Document:
+    """Return the document of a source with its images inside, or for a .gltf with images valid in its folder.
+
+    There they are copied to if it is another folder. Meshes are without Draco data.
+    """
+    if output.ending != ".gltf":
+        return self_contained(source, meshes)
+    document = decode_draco(source.document, meshes)
+    if source.folder is None or source.is_in_folder(output.path):
+        return document
+    document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(output.path)).parent)
+    if not output.dry_run:
+        images.write_copies(copies)
+    return document
 
 
 def self_contained(source: Source, meshes: set[int]) -> Document:

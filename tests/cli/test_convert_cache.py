@@ -12,9 +12,9 @@ from tests.anim.caches.making import FACES, cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal, shell
 
-LOSSY = {".glb": 1e-4, ".png": 2e-4}
+LOSSY = {".glb": 1e-4, ".gltf": 1e-4, ".png": 2e-4}
 EVERY = [ending for ending in READABLE if ending != ".stl"]
-OPTIONS = {".glb": ["--max-error", "0.1mm"]}
+OPTIONS = {ending: ["--max-error", "0.1mm"] for ending in (".glb", ".gltf")}
 
 
 @pytest.fixture

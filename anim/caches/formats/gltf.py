@@ -1,4 +1,4 @@
-"""VertexCache ↔ .glb: morph targets or a flip-book; reading evaluates the whole document."""
+"""VertexCache ↔ .glb and .gltf: morph targets or a flip-book; reading evaluates the whole document."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from anim.caches.formats import gltf_flipbook, gltf_morph
 from anim.caches.formats.flipbook_reader import read_pages
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.storage import Inputs, Outputs, read_all
+from anim.caches.storage import Inputs, Memory, Outputs, companion_name, read_all
 from anim.errors import NotFoundError, RangeError
-from anim.gltf.document import Document, json_array
+from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
@@ -37,13 +37,35 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
     return LAYOUTS[writing.layout](cache, outputs, writing)
 
 
+def write_with_buffers(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
+    """Write a .gltf in the layout `writing.layout`, and its buffers beside it, named after it ("walk.gltf.bin").
+
+    Images stay as the source has them: those in files are not copied.
+    """
+    memory = Memory("cache.glb")
+    result = write(cache, memory, writing)
+    document = container.read(np.frombuffer(memory.files[memory.main], np.uint8))
+    if writing.source is None:  # its first bytes name the format
+        document = replace(document, json={"asset": document.json["asset"], **document.json})
+    files = container.gltf(document, "cache", choose=lambda number, _, __: _buffer_name(outputs.main, number))
+    for name, pieces in files.items():
+        with outputs.create(outputs.main if name == "cache.gltf" else name) as file:
+            for piece in pieces:
+                file.write(piece.data)
+    return result
+
+
+def _buffer_name(main: str, number: int) -> str:
+    return companion_name(main, f"-{number}.bin" if number else ".bin")
+
+
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the frames of a flip-book of this library, or the first clip of another glTF as frames.
 
     Morph targets and skins (linear blend) are evaluated at the clip's own keys, or at `reading.fps`.
     """
     with read_all(inputs, inputs.main) as data:
-        document = container.read(np.frombuffer(data, np.uint8))
+        document = container.read(np.frombuffer(data, np.uint8), lambda name: _beside(inputs, name))
     found = read_pages(document)
     if found is not None:
         return found
@@ -51,6 +73,11 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     if names := directions(document):
         reading.note(f"{' and '.join(names)} are not played: bake the glTF file with them")
     return played
+
+
+def _beside(inputs: Inputs, name: str) -> Bytes:
+    with read_all(inputs, name) as data:
+        return np.frombuffer(data, np.uint8)
 
 
 def evaluate_document(

@@ -33,7 +33,7 @@ from cli.options import caches, common, meshes, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
 from cli.text import Reporter
-from cli.workflows.bake_clip import keeps_materials, onto_source
+from cli.workflows.bake_clip import Output, keeps_materials, onto_source
 from cli.workflows.colliders import parse_colliders
 from cli.workflows.simulate_clip import NO_CLIP, driving_clip
 from cli.workflows.simulation_report import check_report, write_report
@@ -188,7 +188,9 @@ def command(
         None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
     )
     if keeps_materials(ending):
-        cache, given["source"] = onto_source(_as_part(cache, scene, node), source, number, ending)
+        cache, given["source"] = onto_source(
+            _as_part(cache, scene, node), source, number, output=Output(output, ending, dry_run)
+        )
     saved = cache_files.save(
         cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
     )

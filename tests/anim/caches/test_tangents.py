@@ -32,6 +32,7 @@ def tangents_of(of: VertexCache) -> AnyArray:
 
 def test_the_table_says_who_holds_them() -> None:
     assert {name for name, each in CACHE_FORMATS.items() if "tangents" in each.holds} == {
+        ".gltf",
         ".npz",
         ".usdc",
         ".usda",
