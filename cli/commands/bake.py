@@ -111,8 +111,8 @@ def command(
     than the model's size. For joints with non-uniform scale, tools define all methods except lbs differently: here each
     joint first scales the mesh about its own position, then rotates it.
 
-    A .glb or .gltf is the source file with other vertices: its materials, images, texture coordinates, colors, extras and
-    extensions stay, and so do unskinned meshes, cameras and lights with their channels. Skins and the channels of
+    A .glb or .gltf is the source file with other vertices: its materials, images, texture coordinates, colors, extras
+    and extensions stay, and so do unskinned meshes, cameras and lights with their channels. Skins and the channels of
     joints are left out, or stay with --keep-skeleton; so are meshes that --mesh does not select, and other clips.
     USD has the materials as UsdPreviewSurface; their images are in a .usdz, and beside a .usdc or .usda.
     The mesh of a texture keeps them too, and has its look-up in the next free set of texture coordinates.
