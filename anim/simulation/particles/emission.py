@@ -9,7 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError
-from anim.model import Clip, Scene
+from anim.model import Clip, Interpolation, Scene
+from anim.model.skeleton import ancestors
 from anim.sampling.sample import sample
 from anim.skinning.bake import bake
 
@@ -139,9 +140,9 @@ def _at_node(
     assert world is not None
     matrices = world[:, node][inverse.reshape(at.shape)]
     axes = matrices[:, 1, :, :3] @ (np.asarray(direction) / np.linalg.norm(direction))
-    places = matrices[:, :, :, 3]
-    span = np.maximum(at[:, 2] - at[:, 0], 1e-9)[:, None]
-    return places[:, 1], _unit(axes), (places[:, 2] - places[:, 0]) / span
+    positions = matrices[:, :, :, 3]
+    moving = frozenset(ancestors(scene.skeleton.parents, node)) | {node}
+    return positions[:, 1], _unit(axes), _velocity(at, positions, _step_times(clip, moving))
 
 
 def _on_surface(
@@ -157,14 +158,33 @@ def _on_surface(
     chosen = faces[np.searchsorted(np.cumsum(areas) / areas.sum(), random.uniform(0, 1, len(times)))]
     u, v = np.sqrt(random.uniform(0, 1, len(times))), random.uniform(0, 1, len(times))
     barycentric = np.stack([1 - u, u * (1 - v), u * v], axis=1)
-    points = [
-        _vertices(scene, clip, node, np.maximum(times + offset, clip.start), chosen)
-        for offset in (-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S)
-    ]
-    before, at, after = ((barycentric[:, :, None] * each).sum(axis=1) for each in points)
+    at = np.maximum(times[:, None] + np.array([-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S]), clip.start)
+    points = [_vertices(scene, clip, node, column, chosen) for column in at.T]
+    positions = np.stack([(barycentric[:, :, None] * each).sum(axis=1) for each in points], axis=1)
     normals = np.cross(points[1][:, 1] - points[1][:, 0], points[1][:, 2] - points[1][:, 0])
-    span = (times + VELOCITY_STEP_S - np.maximum(times - VELOCITY_STEP_S, clip.start))[:, None]
-    return at, _unit(normals), (after - before) / np.maximum(span, 1e-9)
+    return positions[:, 1], _unit(normals), _velocity(at, positions, _step_times(clip, None))
+
+
+def _step_times(clip: Clip, nodes: frozenset[int] | None) -> Floats:
+    """Sorted key times of the STEP tracks of these nodes, None for all: there a position can jump."""
+    steps = [
+        track.times
+        for track in clip.tracks
+        if track.interpolation is Interpolation.STEP and (nodes is None or track.node in nodes)
+    ]
+    return np.unique(np.concatenate(steps)) if steps else np.empty(0)
+
+
+def _velocity(at: Floats, positions: Floats, jumps: Floats) -> Floats:
+    """Velocities (n, 3) at the second of three times (n, 3), from positions (n, 3, 3); a jump is no velocity.
+
+    With a jump before or after, the difference is one of the other half; with jumps in both it is 0.
+    """
+    counts = np.searchsorted(jumps, at, side="right")
+    is_smooth = counts[:, 1:] == counts[:, :-1]  # (n, 2)
+    steps = np.where(is_smooth[:, :, None], np.diff(positions, axis=1), 0.0)
+    span = np.where(is_smooth, np.diff(at, axis=1), 0.0).sum(axis=1)
+    return np.asarray(steps.sum(axis=1) / np.maximum(span, 1e-9)[:, None])
 
 
 def _vertices(scene: Scene, clip: Clip, node: int, times: Floats, chosen: Ints) -> Floats:
