@@ -62,8 +62,12 @@ def _title(report: SimulationReport) -> str:
         return f"{start}: diverges at {format_number(report.first_bad_step * report.step_s)} s"
     parts = []
     if report.energy_j is not None:
-        ends = [format_number(report.energy_j[key]) for key in ("start", "end")]
-        parts.append(f"energy {ends[0]} → {ends[1]} J")
+        drawn = None if report.history is None else report.history.energies.get("total")
+        if drawn is not None and len(drawn):  # above the lowest potential, as the curve below
+            ends = [float(drawn[0]), float(drawn[-1])]
+        else:
+            ends = [report.energy_j["start"], report.energy_j["end"]]
+        parts.append(f"energy {format_number(ends[0])} → {format_number(ends[1])} J")
     if report.worst_stretch is not None:
         parts.append(f"stretched by {float(100 * report.worst_stretch['fraction']):.2g} % at most")
     if report.error_estimate_m is not None:
@@ -87,7 +91,8 @@ def _length(meters: float) -> str:
 def _draw_energy(sheet: Figure, history: RunHistory, height: float) -> None:
     width = CURVES - LEFT - LABELS
     axes = sheet.panel(LEFT, HEAD, width, height)
-    sheet.text(LEFT, HEAD - 0.1, "Energy, J", fontsize=TEXT)
+    words = "Energy, J, above the lowest potential" if "potential" in history.energies else "Energy, J"
+    sheet.text(LEFT, HEAD - 0.1, words, fontsize=TEXT)
     ends = []
     for color, (name, values) in zip((INK, *COLORS), history.energies.items(), strict=False):
         axes.plot(history.times, values, color=color, linewidth=2.0 if name == "total" else 1.2)

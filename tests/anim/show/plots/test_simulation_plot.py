@@ -17,16 +17,22 @@ def _history(errors: int = 50) -> RunHistory:
     times = np.linspace(0, 1, 50)
     height = 2 - 4.9 * times**2
     positions = np.stack([times, height, 0 * times], axis=1)[:, None, :]
-    energies = {"kinetic": 48 * times**2, "potential": 9.81 * height, "total": 20 + 0 * times}
+    energies = {"kinetic": 48 * times**2, "potential": 9.81 * height, "total": 20 - 0.5 * times}
     return RunHistory(times, energies, positions, np.empty((0, 2), np.int64), np.linspace(0, 1e-3, errors))
 
 
 def test_the_title_and_the_curves_are_those_of_the_run() -> None:
-    energy = {"start": 20.0, "end": 19.5, "peak": 20.0}
+    energy = {"start": 120.0, "end": 119.5, "peak": 120.0}  # above another zero than the curves
     report = SimulationReport("rigid", 1 / 240, 240, 60, 1.0, energy_j=energy, error_estimate_m=1e-3)
     drawn = simulation_plot(_with(report, history=_history()), kind="svg").decode()
     assert "rigid: steps of 1/240 s, 1 s: energy 20 → 19.5 J, a run with half the step differs by up to 1 mm" in drawn
-    for words in ("kinetic", "potential", "total", "Distance to the run with half the step, mm"):
+    for words in (
+        "kinetic",
+        "potential",
+        "total",
+        "Energy, J, above the lowest potential",
+        "Distance to the run with half the step, mm",
+    ):
         assert words in drawn
     assert "Distance to" not in simulation_plot(_with(report, history=_history(0)), kind="svg").decode()
 
