@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.model import Clip, Skeleton
+from anim.model import Clip, Interpolation, Skeleton
+from anim.sampling.sample import sample
 from anim.simulation.rigid_bodies.assembly import ancestors
 from anim.simulation.rigid_bodies.loop import BLEND_S
 from anim.simulation.rigid_bodies.motion import RigidMotion
@@ -15,18 +16,20 @@ MIN_OVERLAP_PER_RADIUS = 0.02  # of the smaller body; less is the tolerance of c
 SHEAR_TOLERANCE = 1e-3
 MAX_SEAM_PER_RADIUS = 0.1  # of the smallest body; less is hardly seen
 MAX_LISTED = 3
+MIN_JUMP_PER_RADIUS = 0.02  # of the body
 
 
 def find_notes(
     rigid: RigidScene, skeleton: Skeleton, clip: Clip, motion: RigidMotion, shear: float, seam: float
 ) -> list[str]:
-    """Return remarks: overlaps at the start, approximations, animated parents, shear, a loop's seam; empty for none."""
+    """Return remarks: overlaps at the start, approximations, animated parents, jumps, shear, a loop's seam."""
     return [
         *_without_colliders(rigid, skeleton),
         *_overlaps(rigid, skeleton, motion),
         *_far(rigid, motion),
         *sorted({words for joint in rigid.joints for words in find_approximations(joint)}),
         *_animated_parents(rigid, skeleton, clip),
+        *_jumps(rigid, skeleton, clip),
         *(
             [f"nodes under scaled parents are sheared by up to {shear:.1%}, which keys can't hold"]
             * (shear > SHEAR_TOLERANCE)
@@ -77,6 +80,31 @@ def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list
         return []
     label = skeleton.label(rigid.bodies[below[0]].node)
     return [f"a parent of {label} is animated: play its clip too, or merge both"]
+
+
+def _jumps(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
+    """Animated bodies that STEP keys move at once: within one step, so with any velocity."""
+    found = []
+    for i in rigid.animated:
+        body = rigid.bodies[i]
+        above = set(ancestors(skeleton, body.node))
+        steps = [t.times for t in clip.tracks if t.interpolation is Interpolation.STEP and t.node in above]
+        if not steps:
+            continue
+        at = np.unique(np.concatenate(steps))[1:]
+        times = np.unique(np.concatenate((np.nextafter(at, -np.inf), at)))
+        world = sample(skeleton, clip, times, space="world").world if len(times) else None
+        if world is None:
+            continue
+        places = world[:, body.node, :, 3]
+        jumps = np.linalg.norm(places[1::2] - places[::2], axis=1)
+        if jumps.max() > MIN_JUMP_PER_RADIUS * body.radius:
+            worst = int(jumps.argmax())
+            found.append(
+                f"{skeleton.label(body.node)} jumps by {jumps[worst]:.3g} m at {at[worst]:.3g} s (STEP keys): bodies "
+                "that it touches are thrown away"
+            )
+    return found[:MAX_LISTED]
 
 
 def _seam(rigid: RigidScene, motion: RigidMotion, seam: float) -> list[str]:

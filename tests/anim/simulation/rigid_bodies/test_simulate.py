@@ -58,6 +58,16 @@ def test_tracks_are_relative_to_an_animated_parent() -> None:
     assert run.notes == ["a parent of node 1 is animated: play its clip too, or merge both"]
 
 
+@pytest.mark.parametrize(("interpolation", "noted"), [(Interpolation.STEP, 1), (Interpolation.LINEAR, 0)])
+def test_a_collider_that_jumps_is_noted(interpolation: Interpolation, noted: int) -> None:
+    made = with_clip(
+        document([node((0, 0, 0), collider=collider(0)), node((0, 9, 0), **FALLING)], BALL),
+        Track(0, "translation", interpolation, [0.0, 0.25, 0.5], np.outer([0, 0, 0.75], [0, 1, 0])),
+    )
+    jumps = [each for each in simulate(made, duration=0.75).notes if "jumps by 0.75 m at 0.5 s (STEP keys)" in each]
+    assert len(jumps) == noted
+
+
 def test_a_body_below_a_body_is_its_own() -> None:
     made = document(
         [
