@@ -87,6 +87,7 @@ def test_nodes_without_meshes_are_no_bodies(fixture: Fixture, call: Call, tmp_pa
         ("wall", ("--body", "brick*", "--floor", "1e30"), 2, "--floor is at 1e+30 m (limit 100000)"),
         ("biped", ("--body", "body"), 4, "is skinned"),
         ("biped", ("--body", "left_foot"), 5, "no mesh to collide with"),
+        ("flag", ("--body", "flag"), 3, "is flat: its hull has no volume"),
     ],
 )
 def test_input_without_sense_is_refused_in_one_line(

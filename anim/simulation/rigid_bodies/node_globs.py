@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from anim.errors import AnimError, NotFoundError, UnsupportedError
+from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
 from anim.model import Scene
 from anim.simulation.rigid_bodies.assembly import ancestors
 from anim.simulation.rigid_bodies.description import Collider, Material, Motion, PhysicsDescription, Shape
@@ -29,7 +29,7 @@ def add_chosen(description: PhysicsDescription, scene: Scene, chosen: ChosenNode
     """Return the description with chosen nodes: every mesh below one is a collider, of the nearest body above it.
 
     A node that the description has keeps its collider. Raises NotFoundError for a node without a mesh below it,
-    UnsupportedError for a skinned one, RangeError for one without faces.
+    UnsupportedError for a skinned one, FormatError for one without faces.
     """
     motions = {**dict.fromkeys(chosen.bodies, chosen.motion), **description.motions}
     colliders = dict(description.colliders)
@@ -73,5 +73,7 @@ def _shape(scene: Scene, node: int, kind: str) -> Shape:
         raise UnsupportedError(f"{label} is skinned: a rigid body moves by its node alone")
     try:
         return mesh_shape(instance.mesh, kind, instance.weights)
+    except RangeError as error:  # the mesh is a value of the file
+        raise FormatError(error.problem).at(label) from None
     except AnimError as error:
         raise error.at(label) from None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import FormatError
 from anim.maths import quaternion
 from anim.simulation.rigid_bodies.rapier.frames import isometry, shape_frame
 from anim.simulation.rigid_bodies.rapier.package import load_package
@@ -41,7 +41,7 @@ class ShapeBuilder:
         points, faces = shape.points.astype(np.float32), shape.faces.astype(np.uint32)
         if shape.kind == "mesh" and kind is not BodyKind.DYNAMIC:
             return make.trimesh(points, faces)
-        hull = self._hull(points)
+        hull = self._hull(points, collider)
         if shape.kind == "hull" or _volume(make.trimesh(points, faces)) >= CONVEX_VOLUME_FRACTION * _volume(hull):
             return hull
         return make.convex_decomposition(points, faces)
@@ -64,8 +64,10 @@ class ShapeBuilder:
         x, _, z = quaternion.rotate(back, self._center - origin).tolist()
         return x, z
 
-    def _hull(self, points: Any) -> Any:
-        flat = RangeError("the collider is flat: its hull has no volume")
+    def _hull(self, points: Any, collider: BodyCollider) -> Any:
+        flat = FormatError(
+            f"the collider of node {collider.node} is flat: its hull has no volume", help="give its mesh a thickness"
+        )
         if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1] <= 1e-6 * np.ptp(points):
             raise flat
         try:
