@@ -55,6 +55,8 @@ def _columns(skin: Skin) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
 
 
 def _ends(skeleton: Skeleton) -> frozenset[int]:
-    """Nodes that only mark the end of their parent's stick: those without children."""
+    """Nodes without a stick: those that end their parent's, and single ones beside a skeleton, such as a target."""
     parents = set(skeleton.parents.tolist())
-    return frozenset(i for i in range(len(skeleton)) if i not in parents and skeleton.parents[i] >= 0)
+    leaves = [i for i in range(len(skeleton)) if i not in parents]
+    has_bones = len(leaves) < len(skeleton)
+    return frozenset(i for i in leaves if skeleton.parents[i] >= 0 or has_bones)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -153,3 +154,16 @@ def test_a_file_without_a_mesh_is_shown_as_sticks(tmp_path: Path) -> None:
     mine = bake(scene, clip, times=np.array([0.25])).load_all().positions[0]
     assert len(shown) % 24 == 0
     assert np.allclose(shown, mine, atol=1e-5)
+
+
+def test_a_single_node_beside_a_skeleton_has_no_stick() -> None:
+    nodes = [
+        {"name": "hips", "children": [1]},
+        {"translation": [0, 1, 0]},
+        {"name": "look at", "translation": [0, 0, 9]},
+    ]
+    data = json.dumps({"asset": {"version": "2.0"}, "nodes": nodes, "scenes": [{"nodes": [0, 2]}]}).encode()
+    made = opened(embed(opened(data)).glb)
+    assert np.abs(reader.scene(made).instances[0].mesh.positions).max() == pytest.approx(1)
+    alone = json.dumps({"asset": {"version": "2.0"}, "nodes": nodes[2:] * 2, "scenes": [{"nodes": [0, 1]}]}).encode()
+    assert len(opened(embed(opened(alone)).glb).json["meshes"]) == 2
