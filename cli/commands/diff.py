@@ -170,7 +170,7 @@ def _write_page(
 ) -> None:
     """Write the page of both files, with the table of clips."""
     pairs = [ClipPair(each.old, each.new, each.error, each.statistics.p99) for each in report.diff.clips]
-    content = compare_content(ruler, one[1].clips, other[1].clips, pairs, fps=report.fps)
+    content = compare_content(ruler, one[1].clips, other[1].clips, pairs)
     files = [page_file(name, side.document, side.file.size) for name, side in (one, other)]
     write_page(path, files[0], files[1], voice, content=content, view=worst_view(files[0], content))
 

@@ -97,7 +97,7 @@ def _view(
     selection = Selection(tuple(clip or ()), tuple(node or ()))
     clips, skeleton = reader.names(file.document), reader.skeleton(file.document)
     chosen_clip = reader.clip_name(clips[i], i) if clip and (i := selection.chosen_clips(clips)[0]) >= 0 else None
-    chosen_node = skeleton.display_name(selection.chosen_nodes(skeleton)[0]) if node else None
+    chosen_node = f"#{selection.chosen_nodes(skeleton)[0]}" if node else None
     if chosen_node is not None and not shows:
         shows = ("curves",)
     return PageView(chosen_clip, chosen_node, at, shows)

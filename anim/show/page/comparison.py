@@ -11,14 +11,15 @@ import numpy as np
 from anim.arrays import Floats
 from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.name_matching import match_by_name_then_order
-from anim.measure.error.error_curve import error_curve
-from anim.measure.error.metric import FPS, ErrorMetric, MotionError
+from anim.measure.error.error_curve import ErrorCurve, error_curve
+from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.model import Clip
 from anim.show.page.page import ClipError, PageContent, PageLink, PagePanel, PageRow
 from anim.units import format_number
 
 MAX_POINTS = 400  # of an error curve on the page
-MAX_CURVES = 40  # clips with an error curve, the worst ones
+MAX_CURVES = 100  # clips with an error curve, the worst ones
+CURVE_FPS = 24.0  # of error curves, besides all keys and the middles between them
 MIN_ERROR_PER_DIAGONAL = 1e-7  # smaller errors come from rounding in float32
 UNITS = ((1.0, "m", 1.0), (1e-2, "cm", 1e2), (1e-4, "mm", 1e3), (1e-7, "µm", 1e6), (0.0, "nm", 1e9))
 
@@ -48,11 +49,10 @@ def compare_content(
     *,
     subtitle: str = "",
     player: str = "spec",
-    fps: float = FPS,
 ) -> PageContent:
     """Return error curves, and a panel with the position and time of each clip's largest error, worst first.
 
-    player: a name in PLAYERS. fps: samples per second in addition to all keys.
+    player: a name in PLAYERS.
     """
     found = sorted(pairs, key=lambda pair: -pair.error.max_error)
     least = MIN_ERROR_PER_DIAGONAL * ruler.diagonal
@@ -61,8 +61,8 @@ def compare_content(
         if pair.error.max_error <= least:
             errors[pair.old] = ClipError(0.0)
         elif i < MAX_CURVES:
-            curve = error_curve(ruler, old[pair.old], new[pair.new], player=player, fps=fps)
-            errors[pair.old] = ClipError(pair.error.max_error, *_reduce(curve.times, curve.error))
+            curve = error_curve(ruler, old[pair.old], new[pair.new], player=player, fps=CURVE_FPS)
+            errors[pair.old] = ClipError(pair.error.max_error, *_reduce(*_with_peak(curve, pair.error)))
         else:
             errors[pair.old] = ClipError(pair.error.max_error)
     rows = tuple(_row(ruler, old, pair) for pair in found if pair.error.max_error > least)
@@ -80,6 +80,14 @@ def _row(ruler: ErrorMetric, old: Sequence[Clip], pair: ClipPair) -> PageRow:
     name = f"{clip_name(old[pair.old].name, pair.old)} · {error.joint}"
     cells = (name, *p99, f"{error.time:.3f} s", _length(error.max_error))
     return PageRow(cells, PageLink(pair.old, node, error.time))
+
+
+def _with_peak(curve: ErrorCurve, peak: MotionError) -> tuple[Floats, Floats]:
+    """Times and errors of a curve, and the largest error at its own time, which the curve may not have."""
+    i = int(np.searchsorted(curve.times, peak.time))
+    if i < len(curve.times) and curve.times[i] == peak.time:
+        return curve.times, curve.error
+    return np.insert(curve.times, i, peak.time), np.insert(curve.error, i, peak.max_error)
 
 
 def _reduce(times: Floats, errors: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:

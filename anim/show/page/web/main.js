@@ -12,7 +12,7 @@ import { GRADIENT, MAX_LIVE_VERTICES, countVertices, measure, nodeColors, paint,
 import { listenToKeys, openSheet } from "./keyboard.js";
 import { applyMaterials } from "./materials.js";
 import { Onion } from "./onion.js";
-import { fillSidebar, markClip, markNode } from "./sidebar.js";
+import { fillSidebar, markClip, markNode, scrollToClip } from "./sidebar.js";
 import { Side } from "./side.js";
 import { Stage } from "./stage.js";
 import {
@@ -236,7 +236,9 @@ function bindings(player) {
 
 function chooseNext(player, direction) {
   const count = player.sides[0].clips.length;
-  if (count) player.chooseClip((state.clip + direction + count) % count);
+  if (!count) return;
+  player.chooseClip((state.clip + direction + count) % count);
+  scrollToClip(state.clip);
 }
 
 function changeSpeed(direction) {
@@ -335,7 +337,8 @@ function begin(player) {
   const [side] = player.sides;
   const asked = readHash(facts.view ?? {});
   const clip = side.clipNames.indexOf(asked.clip);
-  const node = [...side.nodes.values()].find((each) => each.name === asked.node);
+  const nodes = [...side.nodes.values()];
+  const node = nodes.find((each) => each.name === asked.node) ?? nodes.find((each) => `#${each.index}` === asked.node);
   update({ theme: asked.theme, side: asked.side });
   if (side.clips.length) player.chooseClip(Math.max(clip, 0), asked.time ?? 0);
   fit(player);

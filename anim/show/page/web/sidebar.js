@@ -19,10 +19,13 @@ export function fillSidebar(sides, facts, actions) {
 
 export function markClip(index) {
   for (const button of document.querySelectorAll("[data-clip]")) {
-    const isChosen = Number(button.dataset.clip) === index;
-    setPressed(button, isChosen);
-    if (isChosen) button.scrollIntoView({ block: "nearest" });
+    setPressed(button, Number(button.dataset.clip) === index);
   }
+}
+
+/** Scroll the list to a clip chosen by a key; one chosen in the list is in sight. */
+export function scrollToClip(index) {
+  document.querySelector(`[data-clip="${index}"]`)?.scrollIntoView({ block: "nearest" });
 }
 
 export function markNode(index, animated) {

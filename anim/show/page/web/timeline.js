@@ -71,7 +71,9 @@ export class Timeline {
     context.textAlign = "center";
     for (let i = 0; i * step <= this.duration * 1.0001; i++) {
       const text = `${Number((i * step).toFixed(2))}`;
-      context.fillText(i * step + step > this.duration ? `${text} s` : text, Math.max(x(i * step), 8), height - 3);
+      const isLast = (i + 1) * step > this.duration * 1.0001;
+      const left = Math.min(Math.max(x(i * step), 8), this.canvas.clientWidth - 16);
+      context.fillText(isLast ? `${text} s` : text, left, height - 3);
     }
     context.textAlign = "left";
   }
