@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from docs import generate, pages
+from tests.pages import missing
 
 RENEW = "docs/ is not current: run `make docs`"
 NUMBER = re.compile(r"[-+−]?\d+(\.\d+)?(e[-+]?\d+)?")  # in another version of numpy the last digit may differ
@@ -36,6 +37,8 @@ def test_the_reference_names_every_option() -> None:
 @pytest.mark.parametrize("page", [pytest.param(page, id=page.stem) for page in pages.PAGES])
 def test_a_page_shows_what_its_commands_print_and_draw(page: Path, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
+    if "gltf-anim view" in text and missing():
+        pytest.skip(missing())
     pages.write_inputs(tmp_path)
     assert _without_numbers(pages.updated(text, tmp_path)) == _without_numbers(text), RENEW
     for picture in pages.pictures(text):

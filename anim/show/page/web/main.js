@@ -262,6 +262,7 @@ function render(player, changed) {
   player.isDirty = true;
   if (has("clip")) {
     markClip(state.clip);
+    $("#clip-name").textContent = player.sides[0].clipNames[state.clip] ?? "";
     player.resetHeatScale();
   }
   if (has("clip", "node")) {
