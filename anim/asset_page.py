@@ -71,8 +71,10 @@ def _view(
 
 
 def _compare(one: PageFile, other: PageFile) -> PageContent:
-    """Errors over time, where both can be measured; else the page compares vertices by itself."""
+    """Errors over time, where both can be measured by joints; else the page compares vertices by itself."""
     clips = reader.clips(one.document), reader.clips(other.document)
+    if one.is_cache or other.is_cache:
+        return PageContent(partners={0: 0} if len(clips[0]) and len(clips[1]) == 1 else {})
     try:
         ruler = ErrorMetric(reader.scene(one.document), reader.scene(other.document))
         pairs = compare_clips(ruler, *clips)

@@ -7,6 +7,7 @@ from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
 from anim.show.page.comparison import compare_clips, compare_content
 from anim.show.page.page import EMPTY, PageContent, PageFile, PageView
+from cli.io.scenes import read_scene
 from cli.text import Reporter
 from cli.workflows.vertex_motion import is_bake_of
 
@@ -17,13 +18,13 @@ def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str 
     clip: name of the first file's clip that a bake or a cache is of.
     """
     try:
-        scenes = reader.scene(one.document), reader.scene(other.document)
+        old, new = (read_scene(each.document, each.name, voice) for each in (one, other))
         clips = reader.clips(one.document), reader.clips(other.document)
-        if one.is_cache or other.is_cache or is_bake_of(*scenes) or is_bake_of(scenes[1], scenes[0]):
+        if one.is_cache or other.is_cache or is_bake_of(old, new) or is_bake_of(new, old):
             names = [reader.clip_name(each.name, i) for i, each in enumerate(clips[0])]
             index = names.index(clip) if clip in names else 0
             return PageContent(partners={index: 0} if len(clips[1]) == 1 else {})
-        ruler = ErrorMetric(*scenes)
+        ruler = ErrorMetric(old, new)
         return compare_content(ruler, *clips, compare_clips(ruler, *clips))
     except AnimError as error:
         voice.info(f"note: without errors over time: {error}")
