@@ -93,6 +93,11 @@ def accumulate_world(local: Floats, parents: Ints, levels: list[Ints]) -> Floats
     """
     world = np.empty_like(local)
     for depth, nodes in enumerate(levels):
+        if depth and len(nodes) == 1:  # in a chain: without copies
+            node, above = int(nodes[0]), world[parents[nodes[0]]]
+            np.matmul(above[..., :3], local[node], out=world[node])
+            world[node, ..., 3] += above[..., 3]
+            continue
         world[nodes] = local[nodes] if depth == 0 else multiply(world[parents[nodes]], local[nodes])
     return world
 

@@ -90,7 +90,7 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
         step = np.diff(block.times)
         if not len(step):
             continue
-        for part in ruler.parts:
+        for part in ruler.combined:
             field = part.field(block.old, block.new)
             if field is None:
                 continue
@@ -100,7 +100,7 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
             if top.length > worst.size:
                 joint = ruler.called(part.node(rate.joint(top.group, top.frame, top.vertex)))
                 time = float(block.times[top.frame] + block.times[top.frame + 1]) / 2
-                worst = Peak(top.length, time, part.name or joint, joint, part.vertex(top))
+                worst = Peak(top.length, time, part.name_of(top.group) or joint, joint, part.vertex(top))
     return worst
 
 
