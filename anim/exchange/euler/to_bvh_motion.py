@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, linear
+from anim.exchange.euler.frame_error import frame_error
 from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
 from anim.exchange.euler.rotation_order import OrderRules
 from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD
@@ -20,10 +21,12 @@ from anim.model import Clip, Skeleton, TimeAxis
 from anim.model.skeleton import ancestors, nearest_ancestor
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.world import world_rotations
+from anim.units import format_number
 
 GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 MAX_FRAMES = 10_000_000
 TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
+NOTED_ERROR_DEG = 1.0  # degrees, of rotations between frames
 CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
 BRACES = "{}"
 END_NAME_SUFFIX = "_end"  # a static leaf of this name marks the end of its parent
@@ -59,6 +62,7 @@ def to_bvh(
         skipped_note(_unsupported_tracks(skeleton, clip, chosen))
         + _rename_nodes(skeleton, names, chosen)
         + _shift_start(clip)
+        + _lost_between_frames(clip, times)
     )
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
@@ -165,6 +169,15 @@ def _rename_nodes(skeleton: Skeleton, names: Sequence[str], chosen: Collection[i
 
 def _shift_start(clip: Clip) -> tuple[str, ...]:
     return (f"the first key is at {clip.start:.6g} s: a BVH begins there, at 0",) if clip.start > 0 else ()
+
+
+def _lost_between_frames(clip: Clip, times: Floats) -> tuple[str, ...]:
+    """A note on keys that the grid loses."""
+    angle, time = frame_error(clip, times)
+    if np.degrees(angle) <= NOTED_ERROR_DEG:
+        return ()
+    error = format_number(float(np.degrees(angle)), 2)
+    return (f"between frames, a rotation is up to {error}° from the clip, at {time:.3f} s: a higher rate keeps more",)
 
 
 def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:

@@ -1,0 +1,32 @@
+"""Rotations that frames lose: a key between two of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.exchange.euler.frame_error import frame_error
+from anim.exchange.euler.to_bvh_motion import to_bvh
+from tests.clips import STEP, about, clip, skeleton, track
+
+
+def test_a_key_between_two_frames_is_lost() -> None:
+    hit = clip(track("rotation", [0, 0.45, 0.5, 0.55, 1], about("z", [0, 0, 60, 0, 0])))
+    frames = np.array([0, 0.4, 0.6, 1.0])
+    angle, time = frame_error(hit, frames)
+    assert np.degrees(angle) == pytest.approx(60)
+    assert time == 0.5
+    (note,) = to_bvh(skeleton([-1]), hit, order="XYZ", fps=5).notes
+    assert "up to 60° from the clip, at 0.500 s" in note
+
+
+def test_frames_at_the_keys_lose_nothing() -> None:
+    even = clip(track("rotation", [0, 0.5, 1], about("z", [0, 60, 10])))
+    assert frame_error(even, np.array([0, 0.5, 1]))[0] == pytest.approx(0, abs=1e-7)
+    assert to_bvh(skeleton([-1]), even, order="XYZ").notes == ()
+
+
+def test_step_tracks_and_one_frame_are_not_measured() -> None:
+    stepped = clip(track("rotation", [0, 0.3, 1], about("z", [0, 60, 10]), STEP))
+    assert frame_error(stepped, np.array([0, 0.5, 1])) == (0.0, 0.0)
+    assert frame_error(stepped, np.array([0.0])) == (0.0, 0.0)
