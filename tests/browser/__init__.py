@@ -50,7 +50,7 @@ def visit(files: Sequence[Path]) -> list[Visit]:
     if reason := missing():
         raise RuntimeError(reason)
     shots = os.environ.get("PAGE_SHOTS", "")
-    command = ["node", str(SCRIPT), str(package()), str(_chromium()), shots, *map(str, files)]
+    command = ["node", str(SCRIPT), str(package()), str(chromium()), shots, *map(str, files)]
     run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
     if run.returncode:
         raise RuntimeError(run.stderr.decode(errors="replace"))
@@ -67,14 +67,19 @@ def visit(files: Sequence[Path]) -> list[Visit]:
 
 
 def missing() -> str:
-    """Return why no page can be opened, "" if one can."""
+    """Return why no page of ours can be opened, "" if one can."""
+    return missing_browser() or pages.missing()
+
+
+def missing_browser() -> str:
+    """Return why there is no browser, "" if there is one."""
     if shutil.which("node") is None:
         return "node is not installed"
     if package() is None:
         return "playwright-core is not installed (npm install playwright-core, or set GLTF_PLAYWRIGHT_DIR)"
-    if _chromium() is None:
+    if chromium() is None:
         return "Chromium is not installed (apt-get install chromium, or set CHROMIUM)"
-    return pages.missing()
+    return ""
 
 
 @cache
@@ -88,7 +93,8 @@ def package() -> Path | None:
     return None
 
 
-def _chromium() -> str | None:
+def chromium() -> str | None:
+    """Return the path of the browser, None where it is absent."""
     return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
