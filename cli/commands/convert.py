@@ -57,7 +57,8 @@ def command(
 
     USD (extra usd) has the skeletons, skins and morph targets as UsdSkel, materials as UsdPreviewSurface, and one clip,
     sampled at a frame rate and interpolated linearly; a .usdz contains its images, for phones and other programs. If
-    there are several clips, OUT must contain {clip}, or --clip selects one. The stated error is that of the farthest
+    there are several clips, OUT must contain {clip}, or --clip selects one. Unskinned meshes below joints are bound to
+    the skeleton, so that all players move them. The stated error is that of the farthest
     vertex, skinned by USD, at and half-way between frames.
     """
     voice = text.Reporter(quiet)

@@ -33,19 +33,27 @@ def bind_influences(prim: Any, instance: MeshInstance, joints: list[int], to_ske
 
     to_skeleton: (4, 4) from the mesh to the skeleton's bind pose.
     """
-    from pxr import Gf, UsdGeom, UsdSkel, Vt
-
-    binding = UsdSkel.BindingAPI.Apply(prim.GetPrim())
     mesh = instance.mesh
     used = np.flatnonzero((mesh.weights > 0).any(axis=0))  # columns
     weights, own = mesh.weights[:, used], np.array(joints)[mesh.joints[:, used]]
     own[weights == 0] = 0
-    width = len(used)
-    indices = binding.CreateJointIndicesPrimvar(False, width)
-    indices.Set(Vt.IntArray.FromNumpy(own.astype(np.int32).reshape(-1)))
+    _bind(prim, own, weights, to_skeleton)
+
+
+def bind_to_joint(prim: Any, num_points: int, joint: int, to_skeleton: Floats) -> None:
+    """Bind all points of a mesh to one joint of its skeleton."""
+    _bind(prim, np.full((num_points, 1), joint), np.ones((num_points, 1)), to_skeleton)
+
+
+def _bind(prim: Any, joints: AnyArray, weights: Floats, to_skeleton: Floats) -> None:
+    """Set the influences (V, I) of the points."""
+    from pxr import Gf, UsdSkel, Vt
+
+    binding, width = UsdSkel.BindingAPI.Apply(prim.GetPrim()), joints.shape[1]
+    indices = Vt.IntArray.FromNumpy(joints.astype(np.int32).reshape(-1))
+    binding.CreateJointIndicesPrimvar(False, width).Set(indices)
     binding.CreateJointWeightsPrimvar(False, width).Set(Vt.FloatArray.FromNumpy(weights.astype(np.float32).reshape(-1)))
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(to_skeleton.T.tolist()))
-    assert indices.GetInterpolation() == UsdGeom.Tokens.vertex
 
 
 def add_blend_shapes(stage: Any, prim: Any, instance: MeshInstance, about: Json, taken: set[str]) -> list[str]:

@@ -6,7 +6,7 @@ are one skeleton if such a matrix exists, as for the clothes and the body of a c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,9 +44,13 @@ class SkeletonGroup:
     _parents: Ints = field(default_factory=lambda: np.empty(0, np.int64))
 
 
-def group_skeletons(scene: Scene, instances: Iterable[MeshInstance]) -> list[SkeletonGroup]:
+def group_skeletons(
+    scene: Scene, instances: Sequence[MeshInstance], animated: Container[int] = ()
+) -> list[SkeletonGroup]:
     """Return the skeletons of skinned instances, and one for each other instance with morph targets.
 
+    Unskinned instances below joints are members too, bound to their own node: players move skeletons more reliably than
+    prims. animated: nodes that a clip moves; those above joints become joints.
     Raises UnsupportedError for a joint with weight whose inverse bind matrix has no inverse.
     """
     groups: list[SkeletonGroup] = []
@@ -69,9 +73,24 @@ def group_skeletons(scene: Scene, instances: Iterable[MeshInstance]) -> list[Ske
             node: bind @ to_skeleton for node, bind in binds.items() if node not in group.inverse_bind
         }
         group.members.append((instance, matrix))
+    for instance in instances:
+        if instance.skin is None and not len(instance.mesh.targets):
+            _add_attached(groups, instance, scene)
     for group in groups:
-        _join_hierarchy(group, scene)
+        _join_hierarchy(group, scene, animated)
     return groups + morphed
+
+
+def _add_attached(groups: Sequence[SkeletonGroup], instance: MeshInstance, scene: Scene) -> None:
+    """Add an unskinned instance to the skeleton with a joint above it, its node being a joint."""
+    above = list(ancestors(scene.skeleton.parents, instance.node))
+    for group in groups:
+        if any(node in group.inverse_bind for node in above):
+            world = np.vstack((rest_world(scene.skeleton)[instance.node], (0, 0, 0, 1)))
+            if _is_invertible(world):
+                bind = group.inverse_bind.setdefault(instance.node, np.asarray(np.linalg.inv(world), np.float64))
+                group.members.append((instance, np.asarray(np.linalg.inv(bind), np.float64)))
+            return
 
 
 def _inverse_binds(instance: MeshInstance, skin: Skin, scene: Scene) -> dict[int, Floats]:
@@ -115,11 +134,14 @@ def _matrix_into(group: SkeletonGroup, binds: dict[int, Floats], positions: Floa
     return matrix
 
 
-def _join_hierarchy(group: SkeletonGroup, scene: Scene) -> None:
-    """Set the anchor and the joints with their parents from those with a bind."""
+def _join_hierarchy(group: SkeletonGroup, scene: Scene, animated: Container[int]) -> None:
+    """Set the anchor, above which nothing moves, and the joints with their parents from those with a bind."""
     parents = scene.skeleton.parents
     chains = {node: list(ancestors(parents, node)) for node in group.inverse_bind}
     group.anchor = _common_ancestor(list(chains.values()), group.inverse_bind)
+    moving = [node for node in (group.anchor, *ancestors(parents, group.anchor)) if node >= 0 and node in animated]
+    if moving:
+        group.anchor = int(parents[moving[-1]])
     inside = set(chains)
     for chain in chains.values():
         inside.update(chain[: chain.index(group.anchor)] if group.anchor >= 0 else chain)

@@ -16,6 +16,7 @@ from anim.exchange.usd_skel.skeleton_group import SkeletonGroup, group_skeletons
 from anim.exchange.usd_skel.skeleton_prims import SkeletonPrim
 from anim.gltf.document import Document, Json
 from anim.model import Clip, MeshInstance, Scene
+from anim.model.track import NUM_COMPONENTS
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 
 MATERIALS = f"{ROOT}/materials"
@@ -48,6 +49,8 @@ class StageBuilder:
         self._stage, self._document, self._scene, self._times = stage, document, scene, times
         self._rest = PosedSkeleton.at_rest(scene.skeleton)
         self._posed = PoseSampler(scene.skeleton, clip).posed(times.seconds)
+        moving = [track for track in clip.tracks if track.path in NUM_COMPONENTS]
+        self._animated = {track.node for track in moving if track.node is not None}
         self.prims: dict[int, Any] = {}
 
     def build(self, save_image: Callable[[int, str, bytes], str], note: Callable[[str], None]) -> None:
@@ -62,7 +65,7 @@ class StageBuilder:
         stage.SetStartTimeCode(self._times.codes[0])
         stage.SetEndTimeCode(self._times.codes[-1])
         shown = [each for each in self._scene.instances if len(each.mesh.faces)]
-        groups = group_skeletons(self._scene, shown)
+        groups = group_skeletons(self._scene, shown, self._animated)
         kind = UsdSkel.Root if groups else UsdGeom.Xform
         stage.SetDefaultPrim(kind.Define(stage, ROOT).GetPrim())
         self._nodes = NodePrims(stage, self._rest, self._posed, self._times.codes)
@@ -92,6 +95,8 @@ class StageBuilder:
             if instance.skin is not None:
                 joints = [number[node] for node in instance.skin.joints.tolist()]
                 mesh_prims.bind_influences(prim, instance, joints, to_skeleton)
+            elif instance.node in number:
+                mesh_prims.bind_to_joint(prim, len(instance.mesh.positions), number[instance.node], to_skeleton)
             if len(instance.mesh.targets):
                 about = self._about(instance)
                 names += mesh_prims.add_blend_shapes(self._stage, prim, instance, about, taken)

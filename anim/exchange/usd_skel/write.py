@@ -1,7 +1,7 @@
 """Document → skinned USD (.usdc, .usda, .usdz) with UsdSkel, through usd-core (extra `usd`).
 
 The skeleton, its skins and blend shapes stay, and one clip is sampled at a frame rate; other programs and phones play
-it. Unskinned meshes are animated by the transforms of their nodes.
+it. Unskinned meshes below joints are bound to the skeleton; others are animated by the transforms of their nodes.
 """
 
 from __future__ import annotations

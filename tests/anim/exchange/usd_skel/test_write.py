@@ -232,6 +232,18 @@ def test_skins_share_a_skeleton_if_their_bind_poses_agree(tmp_path: Path) -> Non
         assert number_of_skeletons(tmp_path / "out.usdc") == count
 
 
+@pytest.mark.parametrize("name", ["Knight.glb", "BitmojiRun.glb"])
+def test_only_joints_move(name: str, asset: Find, tmp_path: Path) -> None:
+    """Meshes below joints are bound to them, and what moves above joints is a joint: three.js plays no other prims."""
+    from pxr import UsdGeom
+
+    document = opened_path(asset(name))
+    scene, clip = reader.scene(document, normals=True), reader.clips(document)[0]
+    stage = opened_stage(written(document, scene, clip, tmp_path)[0])
+    prims = [UsdGeom.Xformable(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Xformable)]
+    assert not [each.GetPath() for each in prims if each.GetTimeSamples()]
+
+
 def test_refusals(tmp_path: Path) -> None:
     document, scene, clip = arm()
     flat = with_second_skin(scene, lambda m: m * 0).instances[1]
