@@ -18,9 +18,10 @@ export function listenToKeys(bindings) {
   });
   const rows = bindings
     .filter((each) => each.isShown !== false)
-    .map((each) =>
-      make("div", {}, make("span", {}, ...each.keys.map((key) => make("kbd", {}, LABELS[key] ?? key.toUpperCase()))), each.label),
-    );
+    .map((each) => {
+      const keys = each.keys.map((key) => make("kbd", {}, LABELS[key] ?? key.toUpperCase()));
+      return make("div", {}, make("span", {}, ...keys), each.label);
+    });
   $("#keys .list").append(...rows);
 }
 

@@ -1,0 +1,76 @@
+// What the keys do.
+
+import { $ } from "./dom.js";
+import { openSheet } from "./keyboard.js";
+import { scrollToClip } from "./sidebar.js";
+import { LOOPS, SIDES, SPEEDS, cycle, state, toggleShow, update } from "./state.js";
+
+const STEP_S = 1 / 30;
+
+/** All keys, in the order of the sheet. */
+export function bindings(player) {
+  const isPair = player.sides.length > 1;
+  const step = (direction) => (event) =>
+    player.seek(state.time + direction * STEP_S * (event.shiftKey ? 10 : 1), { pause: true });
+  return [
+    { keys: [" "], label: "play or pause", run: () => player.play() },
+    {
+      keys: ["ArrowLeft", "ArrowRight"],
+      label: "1/30 s; with shift 1/3 s",
+      run: (event) => step(event.key === "ArrowLeft" ? -1 : 1)(event),
+    },
+    { keys: [",", "."], label: "key before, next key", run: (event) => player.nextKey(event.key === "," ? -1 : 1) },
+    {
+      keys: ["Home", "End"],
+      label: "start, end",
+      run: (event) => player.seek(event.key === "Home" ? 0 : player.duration, { pause: true }),
+    },
+    {
+      keys: ["p", "n"],
+      label: "clip before, next clip",
+      run: (event) => chooseNext(player, event.key.toLowerCase() === "p" ? -1 : 1),
+    },
+    { keys: ["-", "+"], label: "slower, faster", run: (event) => changeSpeed(event.key === "-" ? -1 : 1) },
+    { keys: ["l"], label: "loop, once, ping-pong", run: () => cycle("loop", LOOPS) },
+    { keys: ["f"], label: "frame everything", run: () => fit(player) },
+    { keys: ["s"], label: "skeleton", run: () => toggleShow("bones") },
+    { keys: ["w"], label: "wireframe", run: () => toggleShow("wire") },
+    { keys: ["o"], label: "onion skins", run: () => toggleShow("onion") },
+    { keys: ["c"], label: "clay", run: () => toggleShow("clay") },
+    { keys: ["g"], label: "curves of the chosen node", run: () => toggleShow("curves") },
+    { keys: ["u"], label: "rotation as degrees from rest, or values", run: () => cycle("unit", ["degrees", "values"]) },
+    { keys: ["h"], label: "heat of the error", run: () => toggleShow("heat"), isShown: isPair },
+    {
+      keys: ["[", "]"],
+      label: "scale of the heat",
+      run: (event) => update({ heatScale: state.heatScale * (event.key === "[" ? 0.5 : 2) }),
+      isShown: isPair,
+    },
+    { keys: ["b"], label: "both, A, B", run: () => cycle("side", SIDES), isShown: isPair },
+    { keys: ["d"], label: "light or dark", run: () => update({ theme: isDark() ? "light" : "dark" }) },
+    { keys: ["?"], label: "this sheet", run: openSheet },
+  ];
+}
+
+function chooseNext(player, direction) {
+  const count = player.sides[0].clips.length;
+  if (!count) return;
+  player.chooseClip((state.clip + direction + count) % count);
+  scrollToClip(state.clip);
+}
+
+function changeSpeed(direction) {
+  const next = SPEEDS.indexOf(state.speed) + direction;
+  if (SPEEDS[next]) update({ speed: SPEEDS[next] });
+}
+
+/** Frame everything. */
+export function fit(player) {
+  player.stage.fit(player.duration);
+  $("#floor").textContent = player.stage.floorLabel;
+  player.isDirty = true;
+}
+
+export function isDark() {
+  return state.theme === "auto" ? matchMedia("(prefers-color-scheme: dark)").matches : state.theme === "dark";
+}
