@@ -20,6 +20,7 @@ from cli.tables import escape_control
 COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
 MAX_ANNOTATIONS = 10  # per severity and step that GitHub shows
+HOME = "https://pypi.org/project/gltf-anim/"
 MAX_RESULTS = 25_000  # of a run; GitHub refuses files with more
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
@@ -84,7 +85,7 @@ def as_sarif(report: CheckReport) -> str:
     seen: Counter[str] = Counter()
     worst = sorted(report.found, key=lambda each: list(Severity).index(each[1].severity))[:MAX_RESULTS]
     results = [_result(path, each, index[each.code], seen) for path, each in worst]
-    driver = {"name": "gltf-anim", "version": __version__, "rules": rules}
+    driver = {"name": "gltf-anim", "version": __version__, "informationUri": HOME, "rules": rules}
     notes: list[dict[str, Any]] = [
         {"level": "error", "message": {"text": f"{path}: {error}"}, "locations": [_location(path)]}
         for path, error in report.refused
