@@ -48,13 +48,15 @@ class SkeletonPrim:
         UsdSkel.BindingAPI.Apply(prim.GetPrim()).CreateAnimationSourceRel().SetTargets([self._animation.GetPath()])
 
     def set_blend_weights(self, names: Sequence[str], weights: Floats) -> None:
-        """Set the weights (F, M) of blend shapes by name."""
+        """Set the weights (F, M) of blend shapes by name; Blender reads only time samples of them."""
         from pxr import Vt
 
         rows = weights.astype(np.float32)
         self._animation.CreateBlendShapesAttr(names)
-        values = [Vt.FloatArray.FromNumpy(row) for row in rows]
-        set_samples(self._animation.CreateBlendShapeWeightsAttr(), values, self._codes, rows)
+        attribute = self._animation.CreateBlendShapeWeightsAttr(Vt.FloatArray.FromNumpy(rows[0]))
+        used = slice(None) if (rows != rows[0]).any() else slice(0, 1)
+        for row, code in zip(rows[used], self._codes[used], strict=True):
+            attribute.Set(Vt.FloatArray.FromNumpy(row), code)
 
     def _set_joints(self, samples: JointSamples) -> None:
         from pxr import Vt

@@ -244,6 +244,20 @@ def test_only_joints_move(name: str, asset: Find, tmp_path: Path) -> None:
     assert not [each.GetPath() for each in prims if each.GetTimeSamples()]
 
 
+def test_constant_weights_have_a_sample(asset: Find, tmp_path: Path) -> None:
+    """Blender reads no default value of them."""
+    from pxr import UsdSkel
+
+    document = opened_path(asset("BitmojiRun.glb"))
+    scene, clip = reader.scene(document, normals=True), reader.clips(document)[0]
+    kept = Clip("still", tuple(track for track in clip.tracks if track.path != "weights"))
+    stage = opened_stage(written(document, scene, kept, tmp_path)[0])
+    (animation,) = [UsdSkel.Animation(prim) for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)]
+    attribute = animation.GetBlendShapeWeightsAttr()
+    assert attribute.GetTimeSamples() == [0.0]
+    assert np.array(attribute.Get(5.0)) == pytest.approx(scene.instances[0].weights, abs=1e-6)
+
+
 def test_refusals(tmp_path: Path) -> None:
     document, scene, clip = arm()
     flat = with_second_skin(scene, lambda m: m * 0).instances[1]
