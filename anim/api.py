@@ -20,12 +20,17 @@ from anim.arrays import Floats, as_floats
 from anim.asset import Asset, PathName, as_asset
 from anim.caches import cache_file
 from anim.caches.options import WriteOptions
+from anim.caches.registry import CACHE_FORMATS
+from anim.caches.source_document.bake_source import BakeSource, baked_meshes
+from anim.caches.source_document.shading_normals import with_shading_normals
+from anim.caches.storage import suffix
 from anim.caches.transforms import statistics, up_axis
 from anim.caches.transforms.vertex_order import reorder
 from anim.errors import AnimError, RangeError
 from anim.gltf.document import Document
-from anim.gltf.io import container
+from anim.gltf.io import container, images
 from anim.gltf.reading import reader
+from anim.gltf.writing.draco_decoding import decode_draco
 from anim.measure.compare import diff as compare
 from anim.measure.compare.diff import Diff
 from anim.measure.error.metric import FPS, ErrorMetric
@@ -93,16 +98,37 @@ class BakedCache(VertexCache):
         preset: str = "plain",
         depth: str = "float",
         rest_mesh: str = ".ply",
+        onto: AssetLike | None = None,
     ) -> None:
         """Write the cache in the format of the file extension, one of `anim.CACHE_FORMATS`.
 
-        Options as of `gltf-anim bake`. Raises UnsupportedError for another extension or a missing package, RangeError
-        for an option that the format doesn't support, OutputError if the file can't be written.
+        Options as of `gltf-anim bake`. onto: the asset that was baked, in world space; its materials and texture
+        coordinates are kept, as by `gltf-anim convert-cache --onto`, and images are inside.
+        Raises UnsupportedError for another extension or a missing package, RangeError for an option that the format
+        doesn't support, OutputError if the file can't be written.
         """
         name = file_path(path)
         cache = up_axis.to_up_axis(reorder(self, vertex_order), up)
         limit = None if max_error is None else meters(max_error, "max_error", lambda: statistics.diagonal(cache))
-        cache_file.save(cache, name, WriteOptions(limit, quantize, layout, preset, depth, rest_mesh))
+        options = WriteOptions(limit, quantize, layout, preset, depth, rest_mesh)
+        if onto is not None:
+            cache, source = _onto(cache, as_asset(onto), suffix(name))
+            options = replace(options, source=source)
+        cache_file.save(cache, name, options)
+
+
+def _onto(cache: VertexCache, asset: Asset, ending: str) -> tuple[VertexCache, BakeSource]:
+    """The cache with normals if the asset is lit, and the asset as its source, with images inside."""
+    format = CACHE_FORMATS.get(ending)
+    if format is not None and "source" not in format.takes:
+        raise RangeError(f"`onto` does not apply to {ending}")
+    document = container.check_edits(asset.document)
+    meshes = {each.mesh for each in baked_meshes(cache, document)}
+    folder = None if asset.source is None else asset.source.folder
+    document = images.embed(decode_draco(document, meshes), folder)
+    if format is not None and "tangents" in format.holds:
+        cache = with_shading_normals(cache, document)
+    return cache, BakeSource(document, 0 if len(asset.clips) == 1 else None)
 
 
 def optimize(
