@@ -79,14 +79,15 @@ def test_codes_and_breaks_in_names_are_shown_not_obeyed(call: Call, fixture: Fix
 
 
 def test_a_folder_is_refused_with_a_way_out(call: Call, tmp_path: Path) -> None:
-    run = call("convert", tmp_path, "-")
+    run = call("sample", tmp_path, "-", "--fps", "1")
     assert refusal(run, 3) == f"gltf-anim: {tmp_path}: is a folder"
     assert run.err.splitlines()[1] == "help: name a file (there is no .glb in it)"
     for name in ("b.glb", "a.glb"):
         (tmp_path / name).write_bytes(built("noop"))
-    advised = call("convert", tmp_path, "-").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
+    run = call("sample", tmp_path, "-", "--fps", "1")
+    advised = run.err.splitlines()[1].removeprefix("help: name a file in it, such as ")
     assert advised == str(tmp_path / "a.glb")
-    assert call("convert", advised, "-").code == 0
+    assert call("inspect", advised).code == 0
 
 
 def test_a_name_that_looks_like_an_option_is_advised_as_a_path(
@@ -94,7 +95,8 @@ def test_a_name_that_looks_like_an_option_is_advised_as_a_path(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "-o.glb").write_bytes(built("noop"))
-    advised = call("convert", ".", "-").err.splitlines()[1].removeprefix("help: name a file in it, such as ")
+    run = call("sample", ".", "-", "--fps", "1")
+    advised = run.err.splitlines()[1].removeprefix("help: name a file in it, such as ")
     assert advised == "./-o.glb"
     assert call("inspect", advised).code == 0
 
