@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from anim.errors import FormatError, RangeError
+from anim.errors import DataRangeError, FormatError, RangeError
 from anim.exchange.euler.motion import Convention, Unit
 from anim.maths.euler import ORDERS, AxesConvention, check_order
 
@@ -44,13 +44,13 @@ def parse_convention(values: dict[str, Any], where: str) -> PartialConvention:
 
 
 def merge_strict(file: PartialConvention, options: PartialConvention) -> PartialConvention:
-    """Return the parts of file and options together. Raises RangeError for contradicting parts."""
+    """Return the parts of file and options together. Raises DataRangeError for contradicting parts."""
     if options.order is not None:
         options = PartialConvention(check_order(options.order), options.frame, options.unit)
     for name in ("order", "frame", "unit"):
         here, there = getattr(file, name), getattr(options, name)
         if here is not None and there is not None and here != there:
-            raise RangeError(f"{NAMES[name]} is {here} in the file (got {there})")
+            raise DataRangeError(f"{NAMES[name]} is {here} in the file (got {there})")
     return fill_from(file, options)
 
 
