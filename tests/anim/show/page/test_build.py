@@ -6,6 +6,7 @@ import importlib
 import json
 import os
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -53,10 +54,36 @@ def test_an_npm_that_fails_is_quoted_and_leaves_the_old_script(tmp_path: Path, m
     assert build.is_current() == before
 
 
-def test_the_hook_asks_for_node_only_where_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def hook_of() -> Callable[[Path], Any]:
     pytest.importorskip("hatchling", reason="hatchling, which builds wheels, is not installed")
     hook_class = runpy.run_path(str(ROOT / "hatch_build.py"))["PageHook"]
-    hook = hook_class(str(ROOT), {}, None, None, "", "wheel")
+    return lambda root: hook_class(str(root), {}, None, None, "", "wheel")
+
+
+def test_the_hook_asks_for_node_only_where_it_is_needed(
+    hook_of: Callable[[Path], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("GLTF_ANIM_PAGE", raising=False)
+    monkeypatch.setenv("PATH", "")
+    (wheel,) = hook_of(tmp_path).dependencies()
+    assert wheel.startswith(build.NODE_WHEEL)
+    bundle = tmp_path / "anim" / "show" / "page" / "bundle"
+    bundle.mkdir(parents=True)
+    (bundle / "page.js").touch()
+    assert hook_of(tmp_path).dependencies() == []
     monkeypatch.setenv("GLTF_ANIM_PAGE", "0")
-    assert hook.dependencies() == []
-    hook.initialize("standard", {})  # builds nothing
+    assert hook_of(ROOT).dependencies() == []
+    hook_of(tmp_path).initialize("standard", {})  # builds nothing
+
+
+def test_a_build_that_fails_is_a_warning(
+    hook_of: Callable[[Path], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("GLTF_ANIM_PAGE", raising=False)
+    builder = tmp_path / "anim" / "show" / "page" / "build" / "__main__.py"
+    builder.parent.mkdir(parents=True)
+    builder.write_text("import sys\nsys.exit('npm is not installed')\n")
+    hook_of(tmp_path).initialize("standard", {})
+    shown = capsys.readouterr()
+    assert "npm is not installed" in shown.out + shown.err
