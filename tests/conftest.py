@@ -1,4 +1,8 @@
-"""Fixtures for all tests: real files of others, which lie beside the repository or not at all."""
+"""Fixtures for all tests: real files of others, which lie beside the repository or not at all.
+
+The gate tries the same random examples each time and has no deadlines: a loaded machine changes nothing. Others are
+tried with `--hypothesis-profile default`.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,12 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as cli.main does, and as early: before numpy
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tests.files import ASSETS, BAD_INPUTS, SHARED
+
+settings.register_profile("gate", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("gate")
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from anim.errors import UnsupportedError, not_written
 
 if TYPE_CHECKING:  # several modules of the standard library, which one process does not need
-    from concurrent.futures import Future, ProcessPoolExecutor
+    from concurrent.futures import Executor, Future
 
     from anim.worker_processes import Lifeline
 
@@ -25,7 +25,7 @@ Result = TypeVar("Result")
 class ProcessPool:
     """Runs one function on many arguments; `shared` is passed to every process once."""
 
-    def __init__(self, pool: ProcessPoolExecutor | None, shared: Any) -> None:
+    def __init__(self, pool: Executor | None, shared: Any) -> None:
         self._pool, self._shared = pool, shared
         self._started: Future[None] | None = None  # done once a process has started
 

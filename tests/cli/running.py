@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # The folder of the installed command comes first, so that shell lines find it; compiled modules are kept, as users do.
 ENVIRONMENT = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
 ENVIRONMENT.pop("PYTHONDONTWRITEBYTECODE", None)
-TIMEOUT = 60  # s, for one process
+TIMEOUT = 180  # s, for one process on a busy machine
 
 
 class Run(NamedTuple):

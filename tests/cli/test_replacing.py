@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call, Find
-from tests.cli.running import ENVIRONMENT, ROOT, TIMEOUT, built, refusal, shell, started
+from tests.cli.running import ENVIRONMENT, ROOT, TIMEOUT, built, refusal, shell
 
 # The command line, but it stops before it puts its finished temporary file into place.
 PAUSED = """
@@ -24,7 +24,7 @@ import os, signal, sys, time
 from cli import main
 def paused(source, target):
     print("paused", file=sys.stderr, flush=True)
-    time.sleep(60)
+    time.sleep(600)
 os.replace = paused
 signal.signal(signal.SIGINT, signal.default_int_handler)
 main.main()
@@ -55,17 +55,37 @@ def test_a_killed_run_leaves_what_was_there(
         assert [name.startswith(".out.glb.") and name.endswith(".tmp") for name in others] == [True]
 
 
+# The command line, but it says when Python has started.
+READY = """
+import sys
+from cli import entry_point
+print("ready", file=sys.stderr, flush=True)
+entry_point.main()
+"""
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-@pytest.mark.parametrize("delay", [0.1, 0.4, 0.8])
+@pytest.mark.parametrize("delay", [0.1, 0.3, 0.6])
 def test_a_run_killed_at_work_leaves_nothing(number: signal.Signals, delay: float, asset: Find, tmp_path: Path) -> None:
-    run = started("resample", asset("Knight.glb"), tmp_path / "out.glb", "--fps", "240")
+    command = [
+        sys.executable,
+        "-c",
+        READY,
+        "resample",
+        str(asset("Knight.glb")),
+        str(tmp_path / "out.glb"),
+        "--fps",
+        "240",
+    ]
+    run = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stderr=subprocess.PIPE)
+    assert run.stderr is not None
+    assert run.stderr.readline() == b"ready\n"
     time.sleep(delay)
     run.send_signal(number)
     _, err = run.communicate(timeout=TIMEOUT)
     assert run.returncode in (128 + number, -number)
     assert list(tmp_path.iterdir()) == []
-    if delay > 0.2:  # before, Python itself may still be starting
-        assert err == b""
+    assert err == b""
 
 
 @pytest.mark.parametrize("fails", ["mkstemp", "write"])

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anim.arrays import Floats
@@ -54,7 +54,6 @@ def test_the_end_is_exact_though_it_is_no_frame() -> None:
     np.testing.assert_allclose(made.values[:, 0], [0, 2.5, 5, 7], rtol=1e-6)
 
 
-@settings(deadline=None)
 @given(start=st.floats(0, 100, width=32), length=st.floats(0.125, 10, width=32), fps=st.floats(0.5, 120))
 def test_start_and_end_are_exact(start: float, length: float, fps: float) -> None:
     end = float(np.float32(start + length))

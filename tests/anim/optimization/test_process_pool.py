@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from anim.optimization.process_pool import process_pool
+from anim.optimization import process_pool as module
+from anim.optimization.process_pool import ProcessPool, process_pool
 
 
 def _product(shared: int, task: int) -> tuple[int, int]:
@@ -50,7 +53,8 @@ def test_none_where_there_is_nothing_to_do() -> None:
 
 UNGUARDED = """
 from anim.errors import AnimError
-from anim.optimization.process_pool import process_pool
+from anim.optimization import process_pool as module
+from anim.optimization.process_pool import ProcessPool, process_pool
 
 def size(shared, task):
     return len(shared) + task
@@ -73,15 +77,26 @@ def test_a_script_without_a_main_guard_gets_an_error_that_names_it(tmp_path: Pat
     assert '`if __name__ == "__main__":`' in run.stdout
 
 
-def _started(_: object, task: int) -> tuple[int, int]:
-    return task, time.perf_counter_ns()
+class _Serial(Executor):
+    """Runs at once what is submitted."""
+
+    def submit(self, function: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(function(*given, **named))
+        return future
 
 
-def test_the_most_work_starts_first_and_results_keep_the_order() -> None:
-    with process_pool(2, None) as workforce:
-        found = list(workforce.each(_started, range(8), label=str, work=float))
-    assert [task for task, _ in found] == list(range(8))
-    assert found[7][1] < found[0][1]
+def test_the_most_work_starts_first_and_results_keep_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[int] = []
+    monkeypatch.setattr(module, "_run_in_worker", [None])
+    pool = ProcessPool(_Serial(), None)
+
+    def run(_: object, task: int) -> int:
+        started.append(task)
+        return task
+
+    found = list(pool.each(run, [2, 0, 3, 1], label=str, work=float))
+    assert (started, found) == ([3, 2, 1, 0], [2, 0, 3, 1])
 
 
 def test_one_process_imports_no_multiprocessing() -> None:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
@@ -145,7 +145,6 @@ def test_small_turns_stay_at_constant_speed(angle: float) -> None:
     np.testing.assert_allclose(sample(turn, np.array([0.25])), [about("x", angle / 4)], rtol=1e-12, atol=1e-20)
 
 
-@settings(deadline=None)
 @given(st.sets(st.floats(0, 1e4, width=32), min_size=1, max_size=6), st.lists(st.floats(-10, 2e4), max_size=6))
 def test_locate_is_a_plain_search(keys: set[float], at: list[float]) -> None:
     times = sorted(keys)

@@ -48,7 +48,6 @@ def _fewest(values: Floats, times: Floats) -> int:
     return count[-1]
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 60), st.floats(0.05, 20))
 def test_lines_between_kept_keys_miss_nothing(seed: int, count: int, size: float) -> None:
     rng = np.random.default_rng(seed)
@@ -93,7 +92,7 @@ def test_corners_of_straight_tracks() -> None:
     assert times[joint_greedy_keys(np.stack((zigzag, line)), times)].tolist() == [0, 1, 3, 4]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_not_many_more_than_the_fewest(seed: int) -> None:
     rng = np.random.default_rng(seed)

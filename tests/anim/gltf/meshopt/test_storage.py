@@ -44,7 +44,7 @@ def test_every_clip_comes_back_bit_by_bit(name: str, extension: str, asset: Find
 
 
 @pytest.mark.parametrize("extension", EXTENSIONS)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_any_codes_come_back_as_what_they_decode_to(extension: str, data: st.DataObject) -> None:
     """Any bytes are codes; a document of many equal keys makes compression pay, so streams are really used."""

@@ -6,7 +6,6 @@ Two sets: the Khronos validator's own test files with its reports (shared/bad-in
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,8 +16,6 @@ from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from tests.files import BAD_INPUTS, opened, opened_path
-
-SLOW = 2.0  # s, for one file
 
 # A word of the refusal, or OK, when the file is read, then its clips, then its scene. Buffers are opened when needed
 # only, so faults in those that nothing needs don't show.
@@ -165,9 +162,7 @@ Find = Callable[[str], Path]
 @pytest.mark.parametrize("name", OUTCOMES)
 def test_the_validators_files(name: str, bad_input: Find) -> None:
     path = bad_input(name)
-    began = time.perf_counter()
     refusal = _refusal(lambda: opened_path(path))
-    assert time.perf_counter() - began < SLOW
     _check(refusal, FormatError, OUTCOMES[name])
 
 
@@ -200,9 +195,7 @@ def test_buffers_at_fault_are_refused_when_they_are_needed(name: str, bad_input:
 @pytest.mark.parametrize("name", fixtures.BROKEN)
 def test_broken_fixtures(name: str) -> None:
     case = fixtures.BROKEN[name]
-    began = time.perf_counter()
     refusal = _refusal(lambda: opened(case.data, {}))
-    assert time.perf_counter() - began < SLOW
     _check(refusal, EXIT[case.exit_code], OK if name in ELSEWHERE else case.word)
 
 

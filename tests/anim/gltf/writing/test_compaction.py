@@ -82,7 +82,7 @@ def _add_clip_data(views: list[Json], accessors: list[Json]) -> int:
     return len(accessors) - 2
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(content=files(), blob=st.binary(min_size=SIZE, max_size=SIZE), keys=st.integers(1, 9))
 def test_everybody_finds_their_numbers(content: Json, blob: bytes, keys: int) -> None:
     blob += struct.pack("<8f", 0, 1, *range(6))

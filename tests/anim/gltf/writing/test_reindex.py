@@ -184,7 +184,7 @@ def test_broken_extensions_stay_as_they_are(more: Json) -> None:
     assert drop_placeholders(_file(**more)).json["nodes"] == more["nodes"]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(content=files(), blob=st.binary(min_size=96, max_size=96))
 def test_random_files_keep_what_meshes_and_clips_use(content: Json, blob: bytes) -> None:
     document = opened(glb(text(content), blob + struct.pack("<8f", 0, 1, *range(6))))

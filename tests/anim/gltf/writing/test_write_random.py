@@ -52,7 +52,7 @@ def any_clip(draw: st.DrawFn) -> Clip:
     return Clip(draw(st.text(max_size=5)), tuple(draw(any_track(target)) for target in sorted(targets)))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(clips=st.lists(any_clip(), min_size=1, max_size=2), again=any_clip())
 def test_random_clips_come_back(clips: list[Clip], again: Clip) -> None:
     content = animated() | {"nodes": [{}, {}, {}]}
@@ -79,7 +79,7 @@ def _range(document: Document, number: int) -> Range:
 
 
 @needs_validator
-@settings(max_examples=1, deadline=None)
+@settings(max_examples=1)
 @given(clips=st.lists(any_clip(), min_size=40, max_size=40))
 def test_random_clips_are_valid(clips: list[Clip]) -> None:
     content = glb(text(animated() | {"nodes": [{}, {}, {}], "scenes": [{"nodes": [0, 1, 2]}]}))

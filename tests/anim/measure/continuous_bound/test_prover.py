@@ -27,7 +27,7 @@ ROBOT = pytest.param("Robot.glb", 2, marks=pytest.mark.slow)
 
 
 @given(st.integers(0, 100_000), st.sampled_from(ALL))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_nothing_moves_further_at_any_time(seed: int, player: str) -> None:
     """Small trees with every interpolation, other keys on both sides, morphs, scales, quaternions off unit length."""
     of, before, after = pair(seed)
@@ -38,7 +38,7 @@ def test_nothing_moves_further_at_any_time(seed: int, player: str) -> None:
 
 
 @given(st.integers(0, 100_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_bound_is_tight_where_nothing_is_cubic(seed: int) -> None:
     found = proven(*pair(seed, modes=(STEP, LINEAR, LINEAR), wild=(0.02, 0.1)))
     assert found.bound is not None

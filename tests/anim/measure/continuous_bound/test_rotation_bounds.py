@@ -31,7 +31,7 @@ def _derivatives(of: Scene, moving: Clip, where: Intervals, player: str, share: 
 
 
 @given(st.integers(0, 100_000), st.sampled_from(list(PLAYERS)), st.floats(0.05, 0.95))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_no_derivative_exceeds_its_majorant(seed: int, player: str, share: float) -> None:
     of, before, after = pair(seed, modes=(STEP, LINEAR, LINEAR, CUBICSPLINE))
     where = merge_intervals(dense_times(before, after), before, after)

@@ -42,7 +42,7 @@ def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, 
         assert _missed(values[track], times, keep[track]) <= budgets[track] * (1 + 1e-5)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_no_choice_of_fewer_keys_does(seed: int) -> None:
     """Tried are all of them."""
