@@ -11,7 +11,7 @@ ERROR_FRACTIONS = tuple(
 )  # of the diagonal: 1e-5 to 1e-2, two a decade
 MIN_BOUND_PER_DIAGONAL, MAX_BOUND_PER_DIAGONAL = 1e-6, 0.1  # range of the search
 FIRST_BOUND_PER_DIAGONAL = 1e-3  # of the search
-SIZE_TOLERANCE = 1e-3  # of the maximum size: fewer unused bytes are not worth another search
+SIZE_TOLERANCE = 1e-3  # of the animation's bytes: fewer unused ones are not worth another search
 LOG_BOUND_TOLERANCE = 0.0225  # of the bound's natural logarithm: within 2 % of the smallest such bound
 
 
@@ -41,7 +41,8 @@ def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], Rat
 
     Bounds go up to a tenth of the diagonal. Sizes decrease with the bound's logarithm except for the noise of the
     search, a few percent: the bound is interpolated between the nearest ones that are too small and large enough, and
-    the interval between them is bisected where that did not halve it.
+    the interval between them is bisected where that did not halve it. Stops within LOG_BOUND_TOLERANCE of the smallest
+    bound, or SIZE_TOLERANCE of `max_bytes`.
     """
     exact = tried(0.0)
     if exact.size <= max_bytes:
@@ -57,7 +58,7 @@ def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], Rat
         else:
             low, over, at = at, found.size, high
     width = math.inf
-    while high - low > LOG_BOUND_TOLERANCE and max_bytes - best.size > SIZE_TOLERANCE * max_bytes:
+    while high - low > LOG_BOUND_TOLERANCE and max_bytes - best.size > SIZE_TOLERANCE * best.animation:
         fraction = (over - max_bytes) / (over - best.size) if high - low <= width / 2 else 0.5
         width = high - low
         margin = 0.95 * LOG_BOUND_TOLERANCE  # a bound next to the end of the interval can close it

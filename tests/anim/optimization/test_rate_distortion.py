@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -19,8 +21,15 @@ DIAGONAL = 3.0
 
 
 def _sized(max_error: float) -> RatePoint:
-    """A file of 1000 bytes and 500 more for every factor of 10 below the diagonal."""
-    return RatePoint(max_error, round(1000 - 500 * math.log10(max(max_error, 1e-9) / DIAGONAL)), max_error)
+    """A file of 1000 bytes and 500 more for every factor of 10 below the diagonal, all of them animation."""
+    size = round(1000 - 500 * math.log10(max(max_error, 1e-9) / DIAGONAL))
+    return RatePoint(max_error, size, max_error, size)
+
+
+def _with_meshes(max_error: float) -> RatePoint:
+    """The same file with 10 MB of meshes."""
+    plain = _sized(max_error)
+    return replace(plain, size=10_000_000 + plain.size)
 
 
 def test_a_curve_goes_from_small_bounds_to_large() -> None:
@@ -32,10 +41,12 @@ def test_a_curve_goes_from_small_bounds_to_large() -> None:
     assert [each.max_error for each in curve(1.0, _sized, (0.3, 0.1))] == [0.1, 0.3]
 
 
+@pytest.mark.parametrize("sized", [_sized, _with_meshes])
 @pytest.mark.parametrize("share", [3e-6, 1e-4, 0.02])
-def test_the_smallest_bound_that_fits(share: float) -> None:
-    limit = _sized(share * DIAGONAL).size
-    found = smallest_error(limit, DIAGONAL, _sized)
+def test_the_smallest_bound_that_fits(share: float, sized: Callable[[float], RatePoint]) -> None:
+    """However few bytes of the file are animation."""
+    limit = sized(share * DIAGONAL).size
+    found = smallest_error(limit, DIAGONAL, sized)
     assert found is not None
     assert found.size <= limit
     assert share * 0.995 <= found.max_error / DIAGONAL <= 1.03 * share
