@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 from anim.arrays import AnyArray
 from anim.caches import temporary_files
 from anim.caches.formats.npz import EPOCH
-from anim.caches.formats.usd_writer import package
+from anim.caches.formats.usd_stage import package
 from anim.caches.storage import Memory, Outputs
 from anim.model.point_cache import PointCache
 

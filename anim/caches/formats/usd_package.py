@@ -10,7 +10,7 @@ from pathlib import Path
 ARCHIVE_TIME_S = 315_532_800  # 1980-01-01, the first time of a ZIP file; else the clock is in the bytes
 
 
-def write_package(path: str, stage: str, images: Sequence[tuple[str, bytes]], *, name: str = "cache.usdc") -> None:
+def write_package(path: str, stage: str, images: Sequence[tuple[str, bytes]], *, name: str) -> None:
     """Write a .usdz at `path` from a stage's file, which comes first as `name`, and images by name."""
     from pxr import Sdf
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks, temporary_files
-from anim.caches.formats import usd_motion, usd_writer
+from anim.caches.formats import usd_motion, usd_stage, usd_writer
 from anim.caches.formats.npz import parts_of
 from anim.caches.options import ReadOptions
 from anim.caches.storage import Inputs
@@ -48,7 +48,7 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str = ".usd") -> Verte
 @contextmanager
 def _opened(inputs: Inputs, ending: str) -> Iterator[_Stage]:
     """Yield the stage in the main file; any error of usd-core becomes a FormatError."""
-    usd_writer.package()
+    usd_stage.package()
     from pxr import Tf
 
     with temporary_files.temp_input(inputs, inputs.main, ending) as path:
@@ -64,7 +64,7 @@ class _Stage:
     """Meshes of a stage, opened from an input."""
 
     def __init__(self, path: str) -> None:
-        stages, geom, _ = usd_writer.package()
+        stages, geom, _ = usd_stage.package()
         self._stage = stages.Stage.Open(_single_layer(path))
         self._geom, self._default, self._earliest = geom, stages.TimeCode.Default(), stages.TimeCode.EarliestTime()
         self._meshes = usd_motion.meshes(self._stage)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
+from anim.caches.formats.usd_stage import vectors
 from anim.exchange.usd_skel.prim_names import unique, valid
 from anim.gltf.document import Json
 from anim.model import Mesh, MeshInstance
@@ -70,11 +71,11 @@ def add_blend_shapes(stage: Any, prim: Any, instance: MeshInstance, about: Json,
         name = unique(target_name(about, i), own)
         own.add(name)
         shape = UsdSkel.BlendShape.Define(stage, path.AppendChild(name))
-        turns = None if mesh.normal_targets is None or mesh.normals is None else mesh.normal_targets[i]
-        moved = _moved(offsets, turns)
+        normal_offsets = None if mesh.normal_targets is None or mesh.normals is None else mesh.normal_targets[i]
+        moved = _moved(offsets, normal_offsets)
         shape.CreateOffsetsAttr(vectors(offsets[moved]))
-        if turns is not None:
-            shape.CreateNormalOffsetsAttr(vectors(turns[moved]))
+        if normal_offsets is not None:
+            shape.CreateNormalOffsetsAttr(vectors(normal_offsets[moved]))
         if len(moved) < len(offsets):
             _set_points(shape, moved)
         names.append(unique(name, taken))
@@ -94,16 +95,9 @@ def target_name(about: Json, number: int) -> str:
     return valid(given) if isinstance(given, str) and given else f"target{number}"
 
 
-def vectors(rows: AnyArray) -> Any:
-    """Return rows (n, 3) as an array of USD."""
-    from pxr import Vt
-
-    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(rows, np.float32))
-
-
-def _moved(offsets: Floats, turns: Floats | None) -> Ints:
-    """Indices of the points that a blend shape moves or whose normals it turns; the first point if none."""
-    moved = offsets.any(axis=1) if turns is None else offsets.any(axis=1) | turns.any(axis=1)
+def _moved(offsets: Floats, normal_offsets: Floats | None) -> Ints:
+    """Indices of the points with an offset, of position or normal; the first point if none."""
+    moved = offsets.any(axis=1) if normal_offsets is None else offsets.any(axis=1) | normal_offsets.any(axis=1)
     found: Ints = np.flatnonzero(moved)
     return found if len(found) else np.zeros(1, np.int64)
 

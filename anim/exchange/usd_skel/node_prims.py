@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
+from anim.caches.formats.usd_stage import ROOT
 from anim.exchange.usd_skel.prim_names import PrimNames
 from anim.maths import quaternion
 from anim.model.skeleton import ancestors
 from anim.sampling.pose import PosedSkeleton
 
-ROOT = "/root"
 IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 
@@ -58,9 +58,8 @@ class NodePrims:
         rest, pose = self._rest.pose, self._posed.pose
         rows = {name: (getattr(rest, name)[:, node], getattr(pose, name)[:, node]) for name in IDENTITY}
         self._add_op(prim.AddTranslateOp, Gf.Vec3d, *rows["translation"], IDENTITY["translation"])
-        double = (
-            UsdGeom.XformOp.PrecisionDouble
-        )  # usd-core takes the angle from w, whose float32 has errors of 1e-4 rad
+        # usd-core takes the angle from w, whose float32 has errors of 1e-4 rad
+        double = UsdGeom.XformOp.PrecisionDouble
         self._add_op(lambda: prim.AddOrientOp(double), _quaternion, *rows["rotation"], IDENTITY["rotation"])
         self._add_op(prim.AddScaleOp, Gf.Vec3f, *rows["scale"], IDENTITY["scale"])
 

@@ -26,22 +26,16 @@ class SkeletonGroup:
     """A skeleton, and the mesh instances bound to it.
 
     anchor: the node below which it is, −1 for none: the nearest one above all joints. joints: node indices, parents
-    before children; nodes between joints are joints too. inverse_bind: (4, 4) joint_from_skeleton by node, for joints
-    of skins. members: instances, each with mesh-to-skeleton (4, 4) at bind time. Without joints it is for the blend
-    shapes of one unskinned mesh on the anchor.
+    before children; nodes between joints are joints too. parents: (J,) index of the parent joint, −1 for a root.
+    inverse_bind: (4, 4) joint_from_skeleton by node, for joints of skins. members: instances, each with
+    mesh-to-skeleton (4, 4) at bind time. Without joints it is for the blend shapes of one unskinned mesh on the anchor.
     """
 
     anchor: int
     joints: tuple[int, ...] = ()
+    parents: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     inverse_bind: dict[int, Floats] = field(default_factory=dict)
     members: list[tuple[MeshInstance, Floats]] = field(default_factory=list)
-
-    @property
-    def parents(self) -> Ints:
-        """Index of the parent joint (J,), −1 for a root; set by `join_hierarchy`."""
-        return self._parents
-
-    _parents: Ints = field(default_factory=lambda: np.empty(0, np.int64))
 
 
 def group_skeletons(
@@ -148,7 +142,7 @@ def _join_hierarchy(group: SkeletonGroup, scene: Scene, animated: Container[int]
     order = [node for level in scene.skeleton.levels() for node in level.tolist() if node in inside]
     group.joints = tuple(_depth_first(order, parents))
     number = {node: i for i, node in enumerate(group.joints)}
-    group._parents = np.array([number.get(int(parents[node]), -1) for node in group.joints], np.int64)
+    group.parents = np.array([number.get(int(parents[node]), -1) for node in group.joints], np.int64)
 
 
 def _common_ancestor(chains: Sequence[Sequence[int]], joints: Iterable[int]) -> int:

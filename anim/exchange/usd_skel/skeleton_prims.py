@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
+from anim.caches.formats.usd_stage import vectors
 from anim.exchange.usd_skel.joint_samples import JointSamples, constant_scales, joint_samples, scale_remainders
-from anim.exchange.usd_skel.mesh_prims import vectors
 from anim.exchange.usd_skel.node_prims import plain_text, set_samples
 from anim.exchange.usd_skel.prim_names import joint_paths
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup

@@ -10,8 +10,9 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.caches.formats.usd_materials import UsdMaterials, bind_primitives
+from anim.caches.formats.usd_stage import MATERIALS, ROOT, SaveImage, set_metadata
 from anim.exchange.usd_skel import mesh_prims
-from anim.exchange.usd_skel.node_prims import ROOT, NodePrims
+from anim.exchange.usd_skel.node_prims import NodePrims
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup, group_skeletons
 from anim.exchange.usd_skel.skeleton_prims import SkeletonPrim
 from anim.gltf.document import Document, Json
@@ -19,7 +20,6 @@ from anim.model import Clip, MeshInstance, Scene
 from anim.model.track import NUM_COMPONENTS
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 
-MATERIALS = f"{ROOT}/materials"
 TIME_TOLERANCE_S = 4e-7  # s, of frames; less than half the shortest jump
 
 
@@ -53,17 +53,12 @@ class StageBuilder:
         self._animated = {track.node for track in moving if track.node is not None}
         self.prims: dict[int, Any] = {}
 
-    def build(self, save_image: Callable[[int, str, bytes], str], note: Callable[[str], None]) -> None:
+    def build(self, save_image: SaveImage, note: Callable[[str], None]) -> None:
         """Write everything. save_image, note: as of UsdMaterials."""
         from pxr import UsdGeom, UsdSkel
 
         stage = self._stage
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        stage.SetTimeCodesPerSecond(self._times.rate)
-        stage.SetFramesPerSecond(self._times.rate)
-        stage.SetStartTimeCode(self._times.codes[0])
-        stage.SetEndTimeCode(self._times.codes[-1])
+        set_metadata(stage, self._times.rate, self._times.codes)
         shown = [each for each in self._scene.instances if len(each.mesh.faces)]
         groups = group_skeletons(self._scene, shown, self._animated)
         kind = UsdSkel.Root if groups else UsdGeom.Xform

@@ -7,24 +7,22 @@ it. Unskinned meshes below joints are bound to the skeleton; others are animated
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from anim.arrays import Floats
-from anim.caches import temporary_files
-from anim.caches.formats.usd_package import write_package
-from anim.caches.formats.usd_writer import USUAL_FPS, package
-from anim.caches.storage import Outputs, companion_name
+from anim.caches.formats.usd_stage import SaveImage, package, usual_rate, write_stage
+from anim.caches.storage import Outputs
 from anim.errors import NotFoundError
 from anim.exchange.usd_skel.measured_error import StageError, stage_error
 from anim.exchange.usd_skel.stage import StageBuilder, StageTimes
 from anim.gltf.document import Document
 from anim.model import Clip, Interpolation, Scene
-from anim.sampling.times import frame_times, jump_time_before
+from anim.sampling.times import check_fps, frame_times, jump_time_before
 
 USD_FORMATS = (".usdz", ".usdc", ".usda")
 DEFAULT_FPS = 60.0  # of clips whose keys are on the frames of no common rate
-FRAME_TOLERANCE = 1e-3  # of a frame
 MIN_INTERVAL_S = 5e-7  # s; half the shortest jump
 MAX_KEY_INTERVAL_S = 0.05  # s; of clips with keys farther apart, the rate of the keys is none of frames
 
@@ -52,34 +50,23 @@ def write(
     beside a .usdc or .usda. Raises UnsupportedError without usd-core, or for a skin that USD can't express,
     NotFoundError without faces.
     """
-    usd, _, _ = package()
+    package()
+    if fps is not None:
+        check_fps(fps)
     if not any(len(each.mesh.faces) for each in scene.instances):
         raise NotFoundError("there is no mesh with faces to write", help="USD has no use for a file without meshes")
-    rate = fps or frame_rate(clip) or DEFAULT_FPS
-    times = StageTimes(sample_times(clip, rate, with_keys=fps is None and frame_rate(clip) is None), rate)
-    images, notes = list[tuple[str, bytes]](), dict.fromkeys(_left_out(document, scene, clip))
+    own_rate = frame_rate(clip) if fps is None else fps
+    rate = own_rate or DEFAULT_FPS
+    times = StageTimes(sample_times(clip, rate, with_keys=own_rate is None), rate)
+    notes = dict.fromkeys(_left_out(document, scene, clip))
 
-    def save_image(number: int, kind: str, data: bytes) -> str:
-        own = f"image{number}{kind}"
-        images.append((own if ending == ".usdz" else companion_name(outputs.main, f"-{own}"), data))
-        return images[-1][0] if ending == ".usdz" else f"./{images[-1][0]}"
-
-    with temporary_files.temp_output(outputs, outputs.main, ending) as path:
-        binary = path if ending == ".usdc" else f"{path}.usdc"
-        stage = usd.Stage.CreateNew(binary)
+    def build(stage: Any, save_image: SaveImage) -> tuple[StageError, dict[int, str]]:
         builder = StageBuilder(stage, document, scene, clip, times)
         builder.build(save_image, lambda words: notes.update({words: None}))
         error = stage_error(stage, builder.prims, scene, clip, times.seconds, times.codes)
-        paths = {node: str(prim.GetPath()) for node, prim in builder.prims.items()}
-        stage.GetRootLayer().Save()
-        if ending == ".usda":
-            stage.GetRootLayer().Export(path)
-        elif ending == ".usdz":
-            del stage, builder
-            write_package(path, binary, images, name="scene.usdc")
-    for name, data in images if ending != ".usdz" else ():
-        with outputs.create(name) as file:
-            file.write(data)
+        return error, {node: str(prim.GetPath()) for node, prim in builder.prims.items()}
+
+    error, paths = write_stage(outputs, ending, "scene.usdc", build)
     return UsdSkelResult(rate, len(times.seconds), error, tuple(notes), paths)
 
 
@@ -88,11 +75,7 @@ def frame_rate(clip: Clip) -> float | None:
     keys = clip.key_times
     if len(keys) < 3 or np.diff(keys).max() > MAX_KEY_INTERVAL_S:
         return None
-    for rate in USUAL_FPS:
-        off = (keys[:-1] - keys[0]) * rate
-        if np.abs(off - np.rint(off)).max() < FRAME_TOLERANCE:
-            return float(rate)
-    return None
+    return usual_rate(keys - keys[0])
 
 
 def sample_times(clip: Clip, fps: float, *, with_keys: bool = False) -> Floats:
