@@ -42,9 +42,10 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
     The median velocity of all contacts is that of the ground: of a treadmill in clips that stay in place.
     """
-    feet = [joint for joint in _skinned(file) if FEET.search(file.skeleton.names[joint])]
+    joints = file.joints or _animated(file)
+    feet = [joint for joint in _skinned(file) or joints if FEET.search(file.skeleton.names[joint])]
     for report, clip in file.clips() if feet else ():
-        height, contacts = _contacts(file, clip, feet)
+        height, contacts = _contacts(file, clip, joints, feet)
         if not contacts:
             continue
         ground = np.median([each.velocity for each in contacts], axis=0)
@@ -60,16 +61,21 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 
 def _skinned(file: CheckedFile) -> list[int]:
-    """The joints that move vertices, not those of controls; all joints of files without vertices."""
+    """The joints that move vertices, not those of controls; none in files without vertices."""
     nodes = json_array(file.json, "nodes")
     useful: set[int] = set()
     for i, skin in enumerate(json_array(file.json, "skins")):
         instances = [each for each in file.scene.instances if nodes[each.node].get("skin") == i]
         useful |= useful_joints(instances, skin["joints"], file.skeleton)
-    return sorted(useful or file.joints)
+    return sorted(useful)
 
 
-def _contacts(file: CheckedFile, clip: Clip, feet: list[int]) -> tuple[float, list[Contact]]:
+def _animated(file: CheckedFile) -> list[int]:
+    """The animated nodes, which are the joints of a file without skins, as of captured motion."""
+    return sorted({track.node for _, clip in file.clips() for track in clip.tracks if track.node is not None})
+
+
+def _contacts(file: CheckedFile, clip: Clip, joints: list[int], feet: list[int]) -> tuple[float, list[Contact]]:
     """Height of the figure, and the contacts of its feet with the ground."""
     guess = estimate_frame_rate(clip.key_times)
     fps = min(max(guess.fps if guess else DEFAULT_FPS, MIN_FPS), MAX_FPS)
@@ -78,7 +84,7 @@ def _contacts(file: CheckedFile, clip: Clip, feet: list[int]) -> tuple[float, li
     if frames < MIN_CONTACT_FRAMES:
         return 1.0, []
     world = world_by_node(file.skeleton, sample_pose(file.skeleton, clip, times))[..., 3]
-    height = float(world[file.joints][..., 1].max() - world[feet][..., 1].min()) or 1.0
+    height = float(world[joints][..., 1].max() - world[feet][..., 1].min()) or 1.0
     contacts = []
     for foot in feet:
         places = world[foot]

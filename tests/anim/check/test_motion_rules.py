@@ -13,7 +13,7 @@ from anim.check.find import find_all
 from anim.check.finding import Finding
 from anim.check.selection import RuleSelection
 from anim.model import Track
-from tests.anim.check.cases import checked, found, with_tracks
+from tests.anim.check.cases import checked, found, step_of, with_tracks
 from tests.clips import track
 from tests.files import opened_fixture
 
@@ -65,6 +65,16 @@ def test_a_loop_that_creeps_is_found() -> None:
     assert [each.problem for each in findings] == ["the root moves by 2 % of the model's size each time round"]
     assert found(with_tracks(track("translation", np.arange(5) / 4, 0 * way, node=root)), "GA305") == []
     assert found(with_tracks(track("translation", np.arange(5) / 4, 20 * way, node=root)), "GA305") == []
+
+
+def test_feet_of_a_file_without_skins_slide_too() -> None:
+    """Captured motion often comes as nodes alone."""
+    document = step_of(1.0)
+    for node in document.json["nodes"]:
+        node.pop("skin", None)
+        node.pop("mesh", None)
+    del document.json["skins"], document.json["meshes"]
+    assert len(found(document, "GA304")) == 1
 
 
 def test_wide_steps_for_nlerp_and_stretched_joints() -> None:
