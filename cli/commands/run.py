@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from anim.errors import NotFoundError
 from cli import errors, units
 from cli.errors import UsageError
 from cli.io import documents
@@ -21,6 +22,7 @@ from cli.workflows.run import journal as journals
 from cli.workflows.run import outputs
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
+from cli.workflows.run.job import Job
 from cli.workflows.run.plan import plan_jobs
 from cli.workflows.run.prune import prune
 from cli.workflows.run.recipe import chosen_recipes, read_recipes
@@ -116,7 +118,13 @@ def command(
     book = read_recipes(config)
     folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
     record = outputs.read_outputs(folder / outputs.NAME, book.folder)
-    planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
+    is_all = not (inputs or recipe)
+    try:
+        planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
+    except NotFoundError:  # as after all inputs were deleted
+        if is_all and emit is None:
+            _report_stale(record, (), {}, voice, delete=delete_stale)
+        raise
     if emit is not None:
         readable, code = readable_jobs(planned)
         if readable:
@@ -132,7 +140,10 @@ def command(
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:
         _prune(results, limit, voice)
-    _report_stale(record, run, voice, is_all=not (inputs or recipe), delete=delete_stale)
+    if is_all:
+        _report_stale(record, run.jobs, run.written, voice, delete=delete_stale)
+    else:
+        record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written]
     return max(code, _check(written, quiet=quiet)) if check else code
 
@@ -143,12 +154,14 @@ def _prune(results: caching.ResultCache, limit: int, voice: Reporter) -> None:
         voice.info(f"note: {plural(count, 'result')} ({format_bytes(size)}) deleted from the cache: see --cache-size")
 
 
-def _report_stale(record: outputs.OutputRecord, run: RecipeRun, voice: Reporter, *, is_all: bool, delete: bool) -> None:
-    """Name outputs that no recipe makes any more, or delete them. is_all: whether the run has all files and recipes."""
-    stale = record.find_stale([name for job in run.jobs for name in (job.input, job.output)]) if is_all else []
+def _report_stale(
+    record: outputs.OutputRecord, jobs: Sequence[Job], written: Mapping[str, str], voice: Reporter, *, delete: bool
+) -> None:
+    """Name outputs that no recipe makes any more, or delete them, after a run of all files and recipes."""
+    stale = record.find_stale([name for job in jobs for name in (job.input, job.output)])
     if delete:
         outputs.delete_outputs(record.folder, stale)
-    record.save(run.written, stale if delete else ())
+    record.save(written, stale if delete else ())
     if stale:
         names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
         what = "deleted" if delete else "--delete-stale deletes them"

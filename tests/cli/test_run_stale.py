@@ -39,6 +39,17 @@ def test_outputs_of_deleted_inputs_are_named_and_deleted(made: Path, call: Call)
     assert "note" not in call("run", "--delete-stale").err
 
 
+def test_outputs_are_named_and_deleted_after_all_inputs_are_gone(made: Path, call: Call) -> None:
+    (made / "crowd/hero.glb").unlink()
+    run = call("run")
+    assert run.code == 5
+    assert "no recipe makes 2 outputs of earlier runs" in run.err
+    assert "no recipe matches a file" in run.err
+    assert call("run", "--delete-stale").code == 5
+    assert outputs(made) == set()
+    assert "note" not in call("run").err
+
+
 def test_only_unchanged_outputs_of_earlier_runs_are_deleted(made: Path, call: Call) -> None:
     (made / "build/crowd/cube.glb").write_bytes(b"other")
     (made / "build/notes.glb").write_bytes(b"mine")
