@@ -27,6 +27,7 @@ MAX_FRAMES = 600  # frames that `best_ranges` compares
 MAX_STEPS = 300  # pairs of frames, and keys, that are measured inside a clip
 MIN_INTERIOR_S = 2e-4  # s, from an end to a key inside
 DEFAULT_FPS = 30.0
+MIN_REGULAR_FRACTION = 0.9  # of the keys, on the frames of a rate
 
 
 class LoopKind(StrEnum):
@@ -181,9 +182,14 @@ def _some(numbers: Floats) -> Floats:
 
 
 def loop_frame_rate(clip: Clip) -> float:
-    """Return the frame rate of an analysis: of regular keys their own, else DEFAULT_FPS."""
-    found = frame_rate.estimate_frame_rate(clip.key_times)
-    return found.fps if found is not None and found.regular > 0.9 else DEFAULT_FPS
+    """Return the frame rate of an analysis: of regular keys their own, else DEFAULT_FPS.
+
+    A few keys of other tracks between the frames, as of a visibility track, don't change the rate.
+    """
+    times = clip.key_times
+    longest = max((axis.times for axis in clip.time_axes), key=len, default=times)
+    found = frame_rate.estimate_frame_rate(longest if len(longest) > MIN_REGULAR_FRACTION * len(times) else times)
+    return found.fps if found is not None and found.regular > MIN_REGULAR_FRACTION else DEFAULT_FPS
 
 
 def frame_duration(fps: float, start: float, end: float) -> float:

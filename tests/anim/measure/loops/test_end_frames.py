@@ -11,7 +11,7 @@ from anim.measure.loops.loop_analysis import LoopKind, analyze_loop
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Scene
 from tests.anim.skinning.scenes import random_scene
-from tests.clips import about, clip, skeleton, track
+from tests.clips import STEP, about, clip, skeleton, track
 
 FPS = 10
 CIRCLE = np.linspace(0, 2 * np.pi, 11)
@@ -30,6 +30,16 @@ def test_a_frame_that_is_missing_or_duplicate() -> None:
     assert kind_of(CLOSED) is None
     assert kind_of(CLOSED[:-1]) is EndFrameKind.MISSING
     assert kind_of(np.vstack((CLOSED, CLOSED[-1:]))) is EndFrameKind.DUPLICATE
+
+
+def test_a_key_between_frames_does_not_hide_a_missing_frame() -> None:
+    """Of a track that shows and hides something."""
+    shown = track("scale", np.array([0, 0.13]), [[1.0, 1, 1], [0.0, 0, 0]], STEP, node=2)
+    moving = track("translation", np.arange(10) / FPS, CLOSED[:-1], node=1)
+    skin = SkinMotion(Scene(skeleton([-1, 0, 1], translation=[[0, 0, 0], [0, 1, 0], [0, 1, 0]]), ()))
+    (found,) = find_end_frames(skin, [clip(moving, shown)], [-1])
+    assert found is not None
+    assert (found.kind, found.duration) == (EndFrameKind.MISSING, 1 / FPS)
 
 
 def test_authored_pauses_are_no_duplicate_frame() -> None:
