@@ -14,6 +14,7 @@ from anim.optimization.options import EFFORTS, Effort, Request
 from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
+from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.optimization.verification import Verification, verify
 
 RETRY_FACTOR = 0.97  # applied to bound / measured error for the next search
@@ -123,13 +124,17 @@ def optimize_clip(optimizer: ClipOptimizer, item: tuple[int, Task]) -> ClipResul
     assert exact is not None
     if best is not None and best.solution.size(context.coding) <= exact.size(context.coding):
         return best
-    is_last_resort = best is None and optimizer.request.bounds.max_error > 0
-    return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=is_last_resort)
+    if best is None and optimizer.request.bounds.max_error > 0:
+        return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=True)
+    return _verify(optimizer, number, exact)
 
 
-def verify_solution(optimizer: ClipOptimizer, item: tuple[int, Clip]) -> Verification:
-    """Return the error of a new version of clip `item[0]` against its source."""
-    return optimizer.verify(*item)
+def _verify(optimizer: ClipOptimizer, number: int, solution: Solution) -> ClipResult:
+    """Verify a solution without its redundant keys; if that exceeds a bound, with them."""
+    slim = drop_redundant_keys(solution, optimizer.after.skeleton, optimizer.request)
+    if slim is not None and (found := optimizer.verify(number, slim.clip)).holds:
+        return ClipResult(slim, found)
+    return ClipResult(solution, optimizer.verify(number, solution.clip))
 
 
 def _keys(clip: Clip) -> int:
@@ -146,9 +151,10 @@ def _search_within_bounds(optimizer: ClipOptimizer, number: int, task: Task, eff
         solution = solve(replace(optimizer.context(extra), effort=effort), task)
         if solution is None:
             return None
-        found = optimizer.verify(number, solution.clip)
+        result = _verify(optimizer, number, solution)
+        found = result.verdict
         if found.holds:
-            return ClipResult(solution, found)
+            return result
         worst = optimizer.worst_vertex(found)
         factor = NEW_VERTEX_RETRY_FACTOR if worst - extra else min(RETRY_FACTOR / found.usage, RETRY_FACTOR)
         extra |= worst

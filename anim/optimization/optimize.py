@@ -11,13 +11,12 @@ from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimization import writing
 from anim.optimization.clip import Task
-from anim.optimization.clip_optimizer import ClipOptimizer, optimize_clip, verify_solution
+from anim.optimization.clip_optimizer import ClipOptimizer, optimize_clip
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
 from anim.optimization.search.plan import Solution
 from anim.optimization.shared_constants import find_constants
-from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.optimization.verification import Verification
 from anim.optimization.writing import changed_clips, write_solutions
 
@@ -81,14 +80,6 @@ def optimize(
             solutions[number], verdicts[number] = each.solution, each.verdict
             without_loss += [number] if each.without_loss else []
             progress(len(solutions) / len(tasks))
-        lossy = {i: each for i, each in solutions.items() if i not in without_loss}
-        slimmer = drop_redundant_keys(lossy, optimizer.after.skeleton, request)
-        items = [(i, each.clip) for i, each in slimmer.items()]
-        for (number, _), found in zip(
-            items, pool.each(verify_solution, items, label=name, work=lambda item: _work(item[1])), strict=True
-        ):
-            if found.holds:
-                solutions[number], verdicts[number] = slimmer[number], found
     new = write_solutions(base.document if base else document, solutions, request.packing)
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):

@@ -52,7 +52,7 @@ WATCHED = {
         ("anim.optimization.clip", "BoundUsage", "analysis"),
         ("anim.optimization.clip_optimizer", "solve", "tracks"),
         ("anim.optimization.clip", "search", "search"),
-        ("anim.optimization.optimize", "drop_redundant_keys", "redundant keys"),
+        ("anim.optimization.clip_optimizer", "drop_redundant_keys", "redundant keys"),
         ("anim.optimization.clip_optimizer", "verify", "verification"),
         ("anim.measure.error.metric", "ErrorMetric.__init__", "verification"),
         ("anim.measure.continuous_bound.prover", "Prover.__init__", "proof"),

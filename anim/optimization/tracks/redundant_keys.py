@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from anim.model import Clip, Skeleton, Track
 from anim.model.track import share_time_axes
@@ -12,19 +12,21 @@ from anim.optimization.tracks.needed_keys import needed_keys
 from anim.optimization.tracks.quantization import EncodedKeys
 
 
-def drop_redundant_keys(solutions: Mapping[int, Solution], skeleton: Skeleton, request: Request) -> dict[int, Solution]:
-    """Return the solutions, by index of the clip, that take fewer bytes without redundant keys; no others.
+def drop_redundant_keys(solution: Solution, skeleton: Skeleton, request: Request) -> Solution | None:
+    """Return the solution of a clip without redundant keys, if it then takes fewer bytes; None if not.
 
-    Redundant keys are those of `anim.measure.inspect.track_statistics.removable_keys` over all clips together, as
-    counted by `inspect`; first and last keys stay. The motion changes by about a millionth of each track's range and
-    must be verified again. Tracks that must stay exact keep all keys.
+    Redundant keys are those of `anim.measure.inspect.track_statistics.removable_keys`, as counted by `inspect`; first
+    and last keys stay. The motion changes by about a millionth of each track's range and must be verified. Tracks that
+    must stay exact keep all keys.
     """
-    places = [(n, k) for n, each in solutions.items() for k in range(len(each.stored))]
-    free = [(n, k) for n, k in places if not _is_exact(solutions[n].clip.tracks[k], request)]
-    old = [(solutions[n].clip.tracks[k], solutions[n].stored[k]) for n, k in free]
-    new = _drop_from(old, skeleton)
-    changed = {place: pair for place, pair, was in zip(free, new, old, strict=True) if pair[1] is not was[1]}
-    return {n: _changed_solution(solutions[n], n, changed) for n in sorted({n for n, _ in changed})}
+    pairs = list(zip(solution.clip.tracks, solution.stored, strict=True))
+    free = [k for k, (track, _) in enumerate(pairs) if not _is_exact(track, request)]
+    new = dict(zip(free, _drop_from([pairs[k] for k in free], skeleton), strict=True))
+    if all(stored is pairs[k][1] for k, (_, stored) in new.items()):
+        return None
+    slim = [new.get(k, pair) for k, pair in enumerate(pairs)]
+    clip = Clip(solution.clip.name, tuple(track for track, _ in slim))
+    return Solution(clip, tuple(stored for _, stored in slim), solution.dropped)
 
 
 def _is_exact(track: Track, request: Request) -> bool:
@@ -40,12 +42,3 @@ def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -
         (track, stored if mask.all() else stored.select_keys(mask))
         for (track, mask), (_, stored) in zip(needed, pairs, strict=True)
     ]
-
-
-def _changed_solution(
-    solution: Solution, number: int, changed: Mapping[tuple[int, int], tuple[Track, EncodedKeys]]
-) -> Solution:
-    pairs = zip(solution.clip.tracks, solution.stored, strict=True)
-    new = [changed.get((number, k), pair) for k, pair in enumerate(pairs)]
-    clip = Clip(solution.clip.name, tuple(track for track, _ in new))
-    return Solution(clip, tuple(stored for _, stored in new), solution.dropped)
