@@ -1,23 +1,28 @@
 """Friction and restitution of contacts by glTF's rules, on Rapier.
 
 Rapier combines the numbers of two colliders by itself. Where that gives another value, it asks a hook in Python about
-each pair of a collider with hooks, in every step, which costs more than the step. So contacts are looked at 60 times a
-second; in between colliders have the numbers that are right for most contacts, and hooks only where they aren't.
+each pair of a collider with hooks, touching or not, in every step, which costs more than the step. So 60 times a second
+contacts are read from Rapier, and colliders get the numbers that are right for most of them; hooks only where they
+aren't.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from anim.arrays import Bools
 from anim.simulation.rigid_bodies.description import Material
 from anim.simulation.rigid_bodies.rapier.materials import MaterialPairs
 from anim.simulation.rigid_bodies.rapier.package import load_package
+from anim.simulation.rigid_bodies.rapier.slip import ColliderPair, SlipReader, Velocity
 
 MAX_STICKING_SPEED_M_S = 0.02  # of contacts, below which static friction counts; those at rest creep less
 SAMPLE_S = 1 / 60  # between two decisions whether a contact slides
+MAX_HOOKED = 4  # colliders with hooks for wrong friction: each costs as much as twenty bodies without
 RULES = {"average": "AVERAGE", "minimum": "MIN", "maximum": "MAX", "multiply": "MULTIPLY"}
 
 
@@ -29,78 +34,86 @@ class _Collider:
     material: Material
     built: Any
     slides: bool = False
-    has_hooks: bool = True
+    has_hooks: bool = False
 
 
 class FrictionHooks:
     """Friction and restitution of all contacts: hooks of Rapier's world.
 
-    A collider has its static friction while its body is slow or any of its contacts sticks, else the dynamic one.
+    A collider has its static friction while its body is slow or any of its contacts sticks, else the dynamic one. That
+    is wrong for a contact that slides between two colliders that stick elsewhere, which hooks correct. In piles, with
+    more than MAX_HOOKED such colliders at once, the others have a friction between both for this sample.
     """
 
     def __init__(self, materials: Sequence[Material], step: float) -> None:
         """materials: of all colliders. step: s."""
         self._pairs = MaterialPairs(materials)
         self.are_needed = self._pairs.need_hooks
-        hooks = load_package().ActiveHooks
-        self._hooks = (hooks.empty(), hooks.MODIFY_SOLVER_CONTACTS)
+        package = load_package()
+        self._hooks = (package.ActiveHooks.empty(), package.ActiveHooks.MODIFY_SOLVER_CONTACTS)
+        self._modes = {name: getattr(package.CoefficientCombineRule, rule) for name, rule in RULES.items()}
         self._colliders: dict[int, _Collider] = {}
-        self._slides: dict[tuple[int, int], bool] = {}
+        self._slides: dict[ColliderPair, bool] = {}
+        self._slips: Mapping[ColliderPair, Velocity] = {}
+        self._are_right: dict[tuple[Material | bool, ...], bool] = {}
         self._interval, self._step = max(1, round(SAMPLE_S / step)), 0
-        self._slow: Sequence[bool] = ()
 
     def add(self, index: int, body: int, material: Material, built: Any) -> None:
         """Add a collider and set its numbers. index: Rapier's. body: index of its body. built: Rapier's collider."""
-        rules = load_package().CoefficientCombineRule
         built.friction = self._pairs.friction(material, False)
-        built.friction_combine_rule = getattr(rules, RULES[self._pairs.friction_mode(material)])
+        built.friction_combine_rule = self._modes[self._pairs.friction_mode(material)]
         built.restitution = material.restitution
-        built.restitution_combine_rule = getattr(rules, RULES[material.restitution_combine])
-        built.active_hooks = self._hooks[self.are_needed]
+        built.restitution_combine_rule = self._modes[material.restitution_combine]
         self._colliders[index] = _Collider(body, material, built)
+        self._set_hooks(self._colliders[index], material in self._pairs.differing)
 
-    def begin_step(self, find_slow: Callable[[float], Sequence[bool]]) -> None:
-        """Choose numbers and hooks of colliders for the next step.
-
-        find_slow: returns for each body whether no point of it is faster than a speed in m/s.
-        """
-        if not self.are_needed:
-            return
-        phase = self._step % self._interval
-        self._step += 1
-        if phase == 0:
-            self._begin_sample(find_slow(MAX_STICKING_SPEED_M_S / 2))
-        if phase == 1:
-            self._end_sample()
-
-    def _begin_sample(self, slow: Sequence[bool]) -> None:
-        """Put hooks on all that may slide; contacts of two slow bodies stick."""
-        self._slow, self._slides = slow, {}
-        for each in self._colliders.values():
-            moves = self._pairs.has_static and not slow[each.body]
-            self._set(each, each.slides and moves, moves or each.material in self._pairs.differing)
-
-    def _end_sample(self) -> None:
-        """Leave hooks where the numbers of both colliders are wrong; new contacts of unlike materials need them too."""
+    def begin_step(self, reader: SlipReader) -> None:
+        """Choose numbers and hooks of colliders for the next step, by the speeds of the last one."""
         if not self._pairs.has_static:
             return
-        sticks = {index for pair, slides in self._slides.items() if not slides for index in pair}
-        slide = {k: not self._slow[each.body] and k not in sticks for k, each in self._colliders.items()}
-        counts = Counter(index for pair in self._slides for index in pair)
-        hooked = set()
-        for (a, b), slides in self._slides.items():
-            materials = (self._colliders[a].material, self._colliders[b].material)
-            if self._pairs.rapier_coefficients(materials, (slide[a], slide[b])) != self._pairs.coefficients(
-                materials, slides
-            ):
-                hooked.add(a if counts[a] <= counts[b] else b)
-        for k, each in self._colliders.items():
-            unlike = not self._pairs.are_alike and not self._slow[each.body]
-            self._set(each, slide[k], k in hooked or unlike or each.material in self._pairs.differing)
+        if self._step == 0 or self._step % self._interval == 1 % self._interval:  # the first step has no contacts yet
+            slow = reader.find_slow(MAX_STICKING_SPEED_M_S / 2)
+            self._choose(slow, reader.find_slips(slow))
+        self._step += 1
 
-    def _set(self, collider: _Collider, slides: bool, has_hooks: bool) -> None:
+    def _choose(self, slow: Bools, slips: Mapping[ColliderPair, Velocity]) -> None:
+        """Set friction and hooks of all colliders.
+
+        slow: bodies whose contacts with each other stick. slips: velocities of all other contacts.
+        """
+        self._slides = {pair: _slides_on(self._slips.get(pair), slip) for pair, slip in slips.items()}
+        self._slips = slips
+        sticking = {index for pair, slides in self._slides.items() if not slides for index in pair}
+        are_slow = slow.tolist()
+        for index, each in self._colliders.items():
+            self._set_friction(each, not are_slow[each.body] and index not in sticking)
+        hooked = sorted(self._find_wrong())[:MAX_HOOKED]
+        for index, each in self._colliders.items():
+            self._set_hooks(each, index in hooked or each.material in self._pairs.differing)
+
+    def _find_wrong(self) -> set[int]:
+        """Colliders that need hooks for a contact; of both the one with fewer contacts."""
+        counts = Counter(index for pair in self._slides for index in pair)
+        return {
+            min(pair, key=lambda index: counts[index])
+            for pair, slides in self._slides.items()
+            if not self._is_right(pair, slides)
+        }
+
+    def _is_right(self, pair: ColliderPair, slides: bool) -> bool:
+        """Whether Rapier gives a contact its friction by the numbers of both colliders."""
+        a, b = (self._colliders[index] for index in pair)
+        key = a.material, b.material, slides, a.slides, b.slides
+        if key not in self._are_right:
+            found = self._pairs.rapier_coefficients((a.material, b.material), (a.slides, b.slides))
+            self._are_right[key] = found == self._pairs.coefficients((a.material, b.material), slides)
+        return self._are_right[key]
+
+    def _set_friction(self, collider: _Collider, slides: bool) -> None:
         if collider.slides != slides:
             collider.slides, collider.built.friction = slides, self._pairs.friction(collider.material, slides)
+
+    def _set_hooks(self, collider: _Collider, has_hooks: bool) -> None:
         if collider.has_hooks != has_hooks:
             collider.has_hooks, collider.built.active_hooks = has_hooks, self._hooks[has_hooks]
 
@@ -114,6 +127,12 @@ class FrictionHooks:
             slides = self._slides[pair] = self._pairs.has_static and _slides(context)
         materials = self._colliders[pair[0]].material, self._colliders[pair[1]].material
         context.friction, context.restitution = self._pairs.coefficients(materials, slides)
+
+
+def _slides_on(before: Velocity | None, now: Velocity) -> bool:
+    """Whether a contact slides, by its velocities at two samples: if they are opposed it has stopped in between."""
+    has_turned = before is not None and sum(a * b for a, b in zip(before, now, strict=True)) < 0
+    return not has_turned and math.hypot(*now) > MAX_STICKING_SPEED_M_S
 
 
 def _slides(context: Any) -> bool:

@@ -19,6 +19,7 @@ from anim.simulation.rigid_bodies.rapier.friction import FrictionHooks
 from anim.simulation.rigid_bodies.rapier.joints import build_joint, find_approximations
 from anim.simulation.rigid_bodies.rapier.package import load_package
 from anim.simulation.rigid_bodies.rapier.shapes import INFINITE_MASS_KG, PLANE_REACH_M, ShapeBuilder
+from anim.simulation.rigid_bodies.rapier.slip import SlipReader
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidScene
 
 __all__ = ["PLANE_REACH_M", "RapierWorld", "find_approximations"]
@@ -51,6 +52,8 @@ class RapierWorld:
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
+        owners = {index: body for index, (body, _) in self._colliders.items()}
+        self._slip = SlipReader(world, self._bodies, [body.radius for body in scene.bodies], owners)
         self._weighed: list[tuple[Any, float]] = []
         self._read = [self._bodies[i] for i in scene.moving]
         anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))
@@ -62,16 +65,8 @@ class RapierWorld:
 
     def step(self) -> None:
         """Advance the world by a step."""
-        self._friction.begin_step(self._find_slow)
+        self._friction.begin_step(self._slip)
         self._world.step()
-
-    def _find_slow(self, speed: float) -> list[bool]:
-        """Return whether no point of a body is faster than `speed` m/s, for each."""
-        found = []
-        for body, own in zip(self._bodies, self._scene.bodies, strict=True):
-            spin = 2 * own.radius * math.hypot(*body.angvel.to_tuple())  # around its center of mass, anywhere inside
-            found.append(math.hypot(*body.linvel.to_tuple()) + spin < speed)
-        return found
 
     def move(self, index: int, position: Floats, rotation: Floats) -> None:
         """Move an animated body to a frame by the end of the next step."""

@@ -87,6 +87,16 @@ def test_static_friction_holds_a_box_and_dynamic_friction_brakes_it(speed: float
     assert motion.positions[-1, 0, 0] == pytest.approx(slid if speed else 0.0, rel=1e-3, abs=1e-4)
 
 
+@pytest.mark.parametrize("speed", [0.7, 0.8, 0.9, 1.2, 1.3])
+def test_a_box_pushed_up_an_incline_stops_and_sticks(speed: float) -> None:
+    """It is slow for some milliseconds only before it would slide back: whenever contacts are read."""
+    angle, material = np.radians(30), Material(0.9, 0.3)
+    box = body(CUBE, (0, 0.25, 0), material=material, velocity=(-speed, 0, 0))
+    motion = run(ground(material), box, seconds=1.0, gravity=(G * np.sin(angle), -G * np.cos(angle), 0.0))
+    expected = -speed * speed / (2 * G * (np.sin(angle) + 0.3 * np.cos(angle)))
+    assert motion.positions[-1, 0, 0] == pytest.approx(expected, abs=2e-3)
+
+
 def test_a_box_that_slides_stops_and_sticks() -> None:
     material = Material(0.9, 0.3)
     motion = run(ground(material), body(CUBE, (0, 0.25, 0), material=material, velocity=(2, 0, 0)), seconds=2.0)

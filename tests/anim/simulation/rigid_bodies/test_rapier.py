@@ -8,9 +8,11 @@ import sys
 
 import pytest
 
+from anim.arrays import Bools
 from anim.simulation.rigid_bodies.description import Material, Shape
-from anim.simulation.rigid_bodies.rapier.friction import FrictionHooks
+from anim.simulation.rigid_bodies.rapier.friction import MAX_HOOKED, FrictionHooks
 from anim.simulation.rigid_bodies.rapier.materials import MaterialPairs
+from anim.simulation.rigid_bodies.rapier.slip import ColliderPair, SlipReader, Velocity
 from tests.anim.simulation.rigid_bodies.cases import body, box_pile, ground, needs_rapier, run
 from tests.cli.running import ROOT
 from tests.test_layers import MODULES, _imported
@@ -79,9 +81,9 @@ def test_one_sliding_collider_is_enough_for_alike_materials(material: Material) 
     )
 
 
-@needs_rapier
-def test_contacts_are_asked_about_sixty_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
+def _count_hooks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A list that each call of a hook is added to."""
+    asked: list[int] = []
     own = FrictionHooks.modify_solver_contacts
 
     def count(self: FrictionHooks, context: object) -> None:
@@ -89,10 +91,42 @@ def test_contacts_are_asked_about_sixty_times_a_second(monkeypatch: pytest.Monke
         own(self, context)
 
     monkeypatch.setattr(FrictionHooks, "modify_solver_contacts", count)
+    return asked
+
+
+@needs_rapier
+def test_contacts_are_read_sixty_times_a_second_and_need_no_hooks(monkeypatch: pytest.MonkeyPatch) -> None:
+    read, asked = [], _count_hooks(monkeypatch)
+    own = SlipReader.find_slips
+
+    def count(self: SlipReader, slow: Bools) -> dict[ColliderPair, Velocity]:
+        read.append(1)
+        return own(self, slow)
+
+    monkeypatch.setattr(SlipReader, "find_slips", count)
     material = Material(0.9, 0.3)
     moving = body(Shape("box", (0.5, 0.5, 0.5)), (0, 0.25, 0), material=material, velocity=(4, 0, 0))
     run(ground(material), moving, seconds=1.0)
-    assert 50 <= len(asked) <= 65
+    assert (len(read), len(asked)) == (61, 0)
+
+
+@needs_rapier
+def test_a_box_that_slides_below_another_has_hooks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It sticks to that above, and the ground has static friction, so the numbers of neither collider are right."""
+    asked = _count_hooks(monkeypatch)
+    material, box, x = Material(0.9, 0.3), Shape("box", (0.5, 0.5, 0.5)), (3.0, 0, 0)
+    pair = [body(box, (0, y, 0), material=material, velocity=x) for y in (0.25, 0.75)]
+    motion = run(ground(material), *pair, seconds=2.0)
+    assert motion.positions[-1, 0, 0] == pytest.approx(9 / (2 * 0.3 * 9.81), rel=0.02)
+    assert asked
+
+
+@needs_rapier
+def test_few_colliders_of_a_pile_have_hooks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rapier calls them for each pair of a collider, touching or not, which would triple the time of the pile."""
+    asked = _count_hooks(monkeypatch)
+    run(*box_pile(40, 0.8), seconds=1.0)
+    assert 0 < len(asked) / 240 < 12 * MAX_HOOKED
 
 
 @needs_rapier
