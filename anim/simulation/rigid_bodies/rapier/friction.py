@@ -101,7 +101,7 @@ class FrictionHooks:
         }
 
     def _is_right(self, pair: ColliderPair, slides: bool) -> bool:
-        """Whether Rapier gives a contact its friction by the numbers of both colliders."""
+        """Return True if Rapier gives a contact its friction by the numbers of both colliders."""
         a, b = (self._colliders[index] for index in pair)
         key = a.material, b.material, slides, a.slides, b.slides
         if key not in self._are_right:
@@ -130,7 +130,7 @@ class FrictionHooks:
 
 
 def _slides_on(before: Velocity | None, now: Velocity) -> bool:
-    """Whether a contact slides, by its velocities at two samples: if they are opposed it has stopped in between."""
+    """Return True for a contact that slides at two samples; with opposed velocities it has stopped in between."""
     has_turned = before is not None and sum(a * b for a, b in zip(before, now, strict=True)) < 0
     return not has_turned and math.hypot(*now) > MAX_STICKING_SPEED_M_S
 
