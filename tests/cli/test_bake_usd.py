@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,13 +66,16 @@ def test_images_beside_and_inside(call: Call, source: Path) -> None:
     images = [each[1] for each in looks(opened_path(source))["images"]]
     assert call("bake", source, source.with_name("a.usdz"), "--clip", "bend").code == 0
     with zipfile.ZipFile(source.with_name("a.usdz")) as package:
-        assert package.namelist() == ["cache.usdc", "image0.png", "image1.png"]
-        assert [package.read(name) for name in package.namelist()[1:]] == images
+        assert package.namelist() == ["cache.usdc", "image0.png", "image1.png", "image1-srgb.png"]
+        assert [package.read(name) for name in package.namelist()[1:]] == [*images, images[1]]
     run = call("bake", source, source.with_name("a.usda"), "--clip", "bend")
-    assert "3 files" in run.err
+    assert "4 files" in run.err
     assert [source.with_name(f"a.usda-image{i}.png").read_bytes() for i in range(2)] == images
     piped = call("bake", source, "-", "--format", "usdc", "--clip", "bend")
-    assert "not written, since the output is a pipe: stdout-image0.png, stdout-image1.png" in piped.err
+    assert (
+        "not written, since the output is a pipe: stdout-image0.png, stdout-image1.png, stdout-image1-srgb.png"
+        in piped.err
+    )
 
 
 def test_faces_are_bound_to_their_materials(call: Call, source: Path) -> None:
@@ -81,10 +85,63 @@ def test_faces_are_bound_to_their_materials(call: Call, source: Path) -> None:
     stage = opened_stage(source.with_name("a.usda"))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/root/mesh"))
     subsets = UsdGeom.Subset.GetAllGeomSubsets(mesh)
-    assert [len(each.GetIndicesAttr().Get()) for each in subsets] == [8, 8]  # and a triangle without a material
+    assert [len(each.GetIndicesAttr().Get()) for each in subsets] == [1, 8, 8]
     bound = [UsdShade.MaterialBindingAPI(each).ComputeBoundMaterial()[0].GetPath() for each in subsets]
-    assert [str(each) for each in bound] == ["/root/materials/material0", "/root/materials/material1"]
-    assert UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsetsFamilyType() == "nonOverlapping"
+    names = ["default_material", "material0", "material1"]  # Blender takes the first one for unbound faces
+    assert [str(each) for each in bound] == [f"/root/materials/{name}" for name in names]
+    assert UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsetsFamilyType() == "partition"
+
+
+def surface(stage: Any, number: int) -> Any:
+    """The surface shader of a material, while its stage is open."""
+    from pxr import UsdShade
+
+    return UsdShade.Shader(stage.GetPrimAtPath(f"/root/materials/material{number}/surface"))
+
+
+@pytest.mark.parametrize(
+    ("material", "threshold", "constant"),
+    [
+        ({"alphaMode": "MASK"}, 1.0, 1.0),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.25}, 0.5, 1.0),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.75}, 1.5, 0.0),
+        ({"alphaMode": "MASK", "alphaCutoff": 0}, None, None),
+        ({"alphaMode": "BLEND"}, None, 0.5),
+        ({"alphaMode": "OPAQUE"}, None, None),
+    ],
+)
+def test_opacity(
+    call: Call, source: Path, material: dict[str, Any], threshold: float | None, constant: float | None
+) -> None:
+    """A mask has no factor in its texture, which three.js and Blender ignore; without a texture it is 0 or 1."""
+    document, out = opened_path(source), source.with_name("a.usda")
+    about = document.json["materials"][1]
+    about |= material
+    about["pbrMetallicRoughness"]["baseColorFactor"] = [0.25, 0.5, 1, 0.5]
+    source.write_bytes(glb_of(document))
+    assert call("bake", source, out, "--clip", "bend").code == 0
+    assert findings(out) == []
+    stage = opened_stage(out)
+    shader = surface(stage, 1)
+    assert (shader.GetInput("opacityThreshold").Get() if shader.GetInput("opacityThreshold") else None) == threshold
+    opacity = shader.GetInput("opacity")
+    assert (opacity.Get() if opacity else None) == constant
+    if opacity:
+        texture, channel, _ = opacity.GetConnectedSource()
+        assert channel == "a"
+        scale = texture.GetPrim().GetAttribute("inputs:scale").Get()
+        assert tuple(scale) == (1, 1, 1, 0.5 if material["alphaMode"] == "BLEND" else 1)
+
+
+def test_an_image_in_two_color_spaces_is_two_files(call: Call, source: Path) -> None:
+    """Blender has one color space for a file: that of a normal map would be wrong as a color."""
+    assert call("bake", source, source.with_name("a.usda"), "--clip", "bend").code == 0
+    stage, found = opened_stage(source.with_name("a.usda")), {}
+    for number, name in ((0, "normal"), (1, "diffuseColor")):
+        texture, _, _ = surface(stage, number).GetInput(name).GetConnectedSource()
+        prim = texture.GetPrim()
+        found[prim.GetAttribute("inputs:file").Get().path] = prim.GetAttribute("inputs:sourceColorSpace").Get()
+    assert found == {"./a.usda-image1.png": "raw", "./a.usda-image1-srgb.png": "sRGB"}
 
 
 def test_texture_coordinates_sample_the_same_texels(call: Call, source: Path) -> None:

@@ -43,8 +43,8 @@ def test_materials_and_images(call: Call, source: Path) -> None:
         assert run.err.count(words) == 1
     assert findings(source.with_name("a.usdz")) == []
     with zipfile.ZipFile(source.with_name("a.usdz")) as package:
-        assert package.namelist() == ["scene.usdc", "image0.png", "image1.png"]
-        assert [package.read(name) for name in package.namelist()[1:]] == images
+        assert package.namelist() == ["scene.usdc", "image0.png", "image1.png", "image1-srgb.png"]
+        assert [package.read(name) for name in package.namelist()[1:]] == [*images, images[1]]
     assert call("convert", source, source.with_name("b.usdc"), "--clip", "bend").code == 0
     assert [source.with_name(f"b.usdc-image{i}.png").read_bytes() for i in range(2)] == images
     assert findings(source.with_name("b.usdc")) == []

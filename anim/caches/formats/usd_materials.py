@@ -8,36 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from anim.arrays import AnyArray, Ints
+from anim.caches.formats.usd_surface_inputs import TextureInput, constant_inputs, input_types, texture_inputs
 from anim.caches.source_document.bake_source import BakedMesh, Span, baked_meshes
-from anim.caches.source_document.lit_meshes import UNLIT, find_item
+from anim.caches.source_document.lit_meshes import find_item
 from anim.errors import FormatError
 from anim.gltf.document import Document, Json
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.materials import DEFAULT_ALPHA_CUTOFF, TRANSFORM, image_data
+from anim.gltf.reading.materials import TRANSFORM, image_data
 from anim.model import VertexCache
 
-EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
 IMAGE_SUFFIXES = {b"\x89PNG": ".png", b"\xff\xd8\xff": ".jpg"}  # formats that every reader of USD knows
 WRAP = {33071: "clamp", 33648: "mirror"}
-WHITE = (1.0, 1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class TextureInput:
-    """An input of UsdPreviewSurface from channels of a texture: value = texel · scale + bias."""
-
-    input: str
-    channels: str
-    info: Json
-    space: str
-    scale: tuple[float, ...] = WHITE
-    bias: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 class UsdMaterials:
@@ -57,11 +43,11 @@ class UsdMaterials:
     ) -> None:
         self._document, self._stage, self._scope, self._note = document, stage, scope, note
         self._accessors, self._save_image = Accessors(document), save_image
-        self._files: dict[int, str] = {}
+        self._files: dict[tuple[int | None, str], str] = {}
         self._defined: dict[int, Any] = {}
 
     def define(self, number: int) -> Any:
-        """Return material `number` of the document, defined on its first use."""
+        """Return material `number` of the document, or glTF's default for -1, defined on its first use."""
         if number not in self._defined:
             self._defined[number] = self._define(number)
         return self._defined[number]
@@ -70,19 +56,19 @@ class UsdMaterials:
         from pxr import Sdf, UsdShade
 
         about = find_item(self._document.json, "materials", number)
-        path = Sdf.Path(f"{self._scope}/material{number}")
+        path = Sdf.Path(f"{self._scope}/{_material_name(number)}")
         material = UsdShade.Material.Define(self._stage, path)
         if about.get("name"):
             material.GetPrim().SetDisplayName(about["name"])
         surface = UsdShade.Shader.Define(self._stage, path.AppendChild("surface"))
         surface.CreateIdAttr("UsdPreviewSurface")
         material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
-        kinds = _input_types(Sdf)
-        for name, value in _constants(about).items():
+        kinds = input_types(Sdf)
+        for name, value in constant_inputs(about).items():
             surface.CreateInput(name, kinds[name]).Set(value)
         nodes: dict[str, Any] = {}
-        for each in _textures(about):
-            file = self._image(each.info, number)
+        for each in texture_inputs(about):
+            file = self._image(each, number)
             if file:
                 self._connect(path, surface, each, file, kinds, nodes)
         return material
@@ -148,11 +134,14 @@ class UsdMaterials:
         sampler = find_item(self._document.json, "samplers", texture.get("sampler"))
         return WRAP.get(sampler.get("wrapS", 0), "repeat"), WRAP.get(sampler.get("wrapT", 0), "repeat")
 
-    def _image(self, info: Json, material: int) -> str:
-        """Path of the file of a texture's image; "" with a note if USD can't show it."""
-        source: int | None = find_item(self._document.json, "textures", info.get("index")).get("source")
-        if source in self._files:
-            return self._files[source]
+    def _image(self, each: TextureInput, material: int) -> str:
+        """Path of the file of a texture's image; "" with a note if USD can't show it.
+
+        An image in two color spaces becomes two files, since Blender has one color space for a file.
+        """
+        source: int | None = find_item(self._document.json, "textures", each.info.get("index")).get("source")
+        if (source, each.space) in self._files:
+            return self._files[source, each.space]
         try:
             is_there = find_item(self._document.json, "images", source)
             data = (
@@ -165,8 +154,10 @@ class UsdMaterials:
         if not ending or source is None:
             self._note(f"a texture of material {material} is left out: {problem}")
             return ""
-        self._files[source] = self._save_image(source, ending, data)
-        return self._files[source]
+        is_second = any(number == source for number, _ in self._files)
+        path = self._save_image(source, f"-{each.space.lower()}{ending}" if is_second else ending, data)
+        self._files[source, each.space] = path
+        return path
 
 
 def bind_materials(cache: VertexCache, document: Document, mesh: Any, materials: UsdMaterials) -> None:
@@ -198,19 +189,24 @@ def bind_primitives(
     starts = np.array([span[0] for _, span in primitives])
     owner: Ints = np.searchsorted(starts, faces[:, 0], side="right") - 1
     of_face = np.array(used)[owner] if len(owner) else np.empty(0, np.int64)
-    numbers = sorted(set(of_face.tolist()) - {-1})
+    numbers = sorted(set(of_face.tolist()))
+    if numbers in ([], [-1]):
+        return
     defined = {number: materials.define(number) for number in numbers}
-    if len(numbers) == 1 and (of_face == numbers[0]).all():
+    if len(numbers) == 1:
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(defined[numbers[0]])
         return
     for number in numbers:
         rows = Vt.IntArray.FromNumpy(np.flatnonzero(of_face == number).astype(np.int32))
-        name, family = f"material{number}", UsdShade.Tokens.materialBind
+        name, family = _material_name(number), UsdShade.Tokens.materialBind
         subset = UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, rows, family)
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(defined[number])
     if numbers:
-        kind = UsdGeom.Tokens.partition if (of_face >= 0).all() else UsdGeom.Tokens.nonOverlapping
-        UsdShade.MaterialBindingAPI(mesh.GetPrim()).SetMaterialBindSubsetsFamilyType(kind)
+        UsdShade.MaterialBindingAPI(mesh.GetPrim()).SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
+
+
+def _material_name(number: int) -> str:
+    return f"material{number}" if number >= 0 else "default_material"
 
 
 def st_name(number: int) -> str:
@@ -236,7 +232,7 @@ def _primitives(document: Document, meshes: Sequence[BakedMesh]) -> Iterator[tup
 
 def _coordinate_sets(json: Json, primitive: Json) -> set[int]:
     """Sets of texture coordinates that a primitive's material uses, and the first one."""
-    infos = [each.info for each in _textures(find_item(json, "materials", primitive.get("material")))]
+    infos = [each.info for each in texture_inputs(find_item(json, "materials", primitive.get("material")))]
     wanted = {0, *map(_coordinate_set, infos)}
     return {each for each in wanted if f"TEXCOORD_{each}" in primitive["attributes"]}
 
@@ -259,56 +255,3 @@ def _add_coordinates(
             rows[slice(*span), 1] = 1 - rows[slice(*span), 1]
     kind, vertex = Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
     UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(st_name(number), kind, vertex).Set(Vt.Vec2fArray.FromNumpy(rows))
-
-
-def _input_types(sdf: Any) -> dict[str, Any]:
-    types = sdf.ValueTypeNames
-    numbers = dict.fromkeys(("metallic", "roughness", "opacity", "opacityThreshold", "occlusion"), types.Float)
-    colors = dict.fromkeys(("diffuseColor", "emissiveColor"), types.Color3f)
-    return {**numbers, **colors, "normal": types.Normal3f}
-
-
-def _constants(about: Json) -> dict[str, Any]:
-    """Inputs with one value; those with a texture too are replaced by its connection."""
-    surface = about.get("pbrMetallicRoughness", {})
-    color = tuple(surface.get("baseColorFactor", WHITE))
-    found: dict[str, Any] = {"diffuseColor": color[:3], "emissiveColor": _emission(about)}
-    if UNLIT in about.get("extensions", {}):
-        found |= {"diffuseColor": (0.0, 0.0, 0.0), "emissiveColor": color[:3], "metallic": 0.0, "roughness": 1.0}
-    else:
-        found |= {"metallic": surface.get("metallicFactor", 1.0), "roughness": surface.get("roughnessFactor", 1.0)}
-    mode = about.get("alphaMode", "OPAQUE")
-    if mode != "OPAQUE":
-        found["opacity"] = color[3]
-    if mode == "MASK":
-        found["opacityThreshold"] = about.get("alphaCutoff", DEFAULT_ALPHA_CUTOFF)
-    return found
-
-
-def _emission(about: Json) -> tuple[float, ...]:
-    strength = about.get("extensions", {}).get(EMISSIVE_STRENGTH, {}).get("emissiveStrength", 1.0)
-    return tuple(strength * each for each in about.get("emissiveFactor", (0.0, 0.0, 0.0)))
-
-
-def _textures(about: Json) -> Iterator[TextureInput]:
-    """Texture inputs of a material."""
-    surface = about.get("pbrMetallicRoughness", {})
-    is_unlit = UNLIT in about.get("extensions", {})
-    color = tuple(surface.get("baseColorFactor", WHITE))
-    if base := surface.get("baseColorTexture"):
-        yield TextureInput("emissiveColor" if is_unlit else "diffuseColor", "rgb", base, "sRGB", color)
-        if about.get("alphaMode", "OPAQUE") != "OPAQUE":
-            yield TextureInput("opacity", "a", base, "sRGB", color)
-    if is_unlit:
-        return
-    if packed := surface.get("metallicRoughnessTexture"):
-        scale = (1.0, surface.get("roughnessFactor", 1.0), surface.get("metallicFactor", 1.0), 1.0)
-        yield TextureInput("roughness", "g", packed, "raw", scale)
-        yield TextureInput("metallic", "b", packed, "raw", scale)
-    if normal := about.get("normalTexture"):
-        yield TextureInput("normal", "rgb", normal, "raw", (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0))
-    if emissive := about.get("emissiveTexture"):
-        yield TextureInput("emissiveColor", "rgb", emissive, "sRGB", (*_emission(about), 1.0))
-    if occlusion := about.get("occlusionTexture"):
-        strength = occlusion.get("strength", 1.0)
-        yield TextureInput("occlusion", "r", occlusion, "raw", (strength,) * 4, (1.0 - strength,) * 4)
