@@ -50,7 +50,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from anim import ops as ops
-    from anim.api import BakedCache as BakedCache
     from anim.api import OptimizeResult as OptimizeResult
     from anim.api import bake as bake
     from anim.api import diff as diff
@@ -61,6 +60,7 @@ if TYPE_CHECKING:
     from anim.asset import load as load
     from anim.asset import save as save
     from anim.asset_page import page as page
+    from anim.baked_cache import BakedCache as BakedCache
     from anim.caches.registry import CACHE_FORMATS as CACHE_FORMATS
     from anim.curves.easing.table import EASINGS as EASINGS
     from anim.curves.tangents.table import TANGENTS as TANGENTS
@@ -83,9 +83,10 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _MODULES = {  # modules of the names, imported on first use
-    "anim.api": ("BakedCache", "OptimizeResult", "bake", "diff", "optimize", "sample", "sample_poses"),
+    "anim.api": ("OptimizeResult", "bake", "diff", "optimize", "sample", "sample_poses"),
     "anim.asset": ("Asset", "load", "save"),
     "anim.asset_page": ("page",),
+    "anim.baked_cache": ("BakedCache",),
     "anim.caches.registry": ("CACHE_FORMATS",),
     "anim.curves.easing.table": ("EASINGS",),
     "anim.curves.tangents.table": ("TANGENTS",),

@@ -9,33 +9,24 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from anim.arguments import check_choice, check_function, check_workers, file_path, glob_list, meters, radians
+from anim.arguments import Length, check_choice, check_function, check_workers, glob_list, meters, radians
 from anim.arrays import Floats, as_floats
-from anim.asset import Asset, PathName, as_asset
-from anim.caches import cache_file
-from anim.caches.options import WriteOptions
-from anim.caches.registry import CACHE_FORMATS
-from anim.caches.source_document.bake_source import BakeSource, baked_meshes
-from anim.caches.source_document.shading_normals import with_shading_normals
-from anim.caches.storage import suffix
-from anim.caches.transforms import statistics, up_axis
-from anim.caches.transforms.vertex_order import reorder
+from anim.asset import Asset, AssetLike, PathName, as_asset
+from anim.baked_cache import BakedCache, BakeOrigin
 from anim.errors import AnimError, RangeError
-from anim.gltf.document import Document
-from anim.gltf.io import container, images
+from anim.gltf.document import copy_json
+from anim.gltf.io import container
 from anim.gltf.reading import reader
-from anim.gltf.writing.draco_decoding import decode_draco
 from anim.measure.compare import diff as compare
 from anim.measure.compare.diff import Diff
 from anim.measure.error.metric import FPS, ErrorMetric
 from anim.measure.error.surface import diagonal
-from anim.model import Clip, VertexCache
+from anim.model import Clip
 from anim.operations.selection import Selection, match_names
 from anim.optimization import optimize as search
 from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Request
@@ -44,9 +35,7 @@ from anim.sampling.sample import sample as sample_table
 from anim.sampling.times import frame_times
 from anim.skinning import bake as skinning
 
-AssetLike: TypeAlias = Asset | Document | PathName
 ClipKey: TypeAlias = Clip | str | int
-Length: TypeAlias = str | float
 SHELL_PER_DIAGONAL = "1%"  # of the diagonal: radius of the sample points around nodes without vertices
 MAX_POINTER_ERROR = 1e-4  # of the range of a pointer track
 
@@ -67,68 +56,6 @@ class OptimizeResult:
     def save(self, path: PathName) -> None:
         """Write the asset, as `anim.save` does."""
         self.asset.save(path)
-
-
-class BakedCache(VertexCache):
-    """Vertex cache with a `save` method. Frames are baked on demand: `load_all()` returns all of them."""
-
-    __slots__ = ()
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the frames themselves: the bake can't be sent to other processes."""
-        values: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
-        return partial(BakedCache, **values | {"chunks": partial(iter, (self.load_all(),))}), ()
-
-    def _repr_html_(self) -> str:
-        """Return the page that plays the cache, for notebooks."""
-        from anim.show.page import notebook
-        from anim.show.page.page import page
-
-        return notebook.frame(lambda: page(notebook.cache_file(self)), repr(self))
-
-    def save(
-        self,
-        path: PathName,
-        *,
-        up: str = "y",
-        vertex_order: str = "file",
-        max_error: Length | None = None,
-        quantize: bool = False,
-        layout: str = "morph",
-        preset: str = "plain",
-        depth: str = "float",
-        rest_mesh: str = ".ply",
-        onto: AssetLike | None = None,
-    ) -> None:
-        """Write the cache in the format of the file extension, one of `anim.CACHE_FORMATS`.
-
-        Options as of `gltf-anim bake`. onto: the asset that was baked, in world space; its materials and texture
-        coordinates are kept, as by `gltf-anim convert-cache --onto`, and images are inside.
-        Raises UnsupportedError for another extension or a missing package, RangeError for an option that the format
-        doesn't support, OutputError if the file can't be written.
-        """
-        name = file_path(path)
-        cache = up_axis.to_up_axis(reorder(self, vertex_order), up)
-        limit = None if max_error is None else meters(max_error, "max_error", lambda: statistics.diagonal(cache))
-        options = WriteOptions(limit, quantize, layout, preset, depth, rest_mesh)
-        if onto is not None:
-            cache, source = _onto(cache, as_asset(onto), suffix(name))
-            options = replace(options, source=source)
-        cache_file.save(cache, name, options)
-
-
-def _onto(cache: VertexCache, asset: Asset, ending: str) -> tuple[VertexCache, BakeSource]:
-    """The cache with normals if the asset is lit, and the asset as its source, with images inside."""
-    format = CACHE_FORMATS.get(ending)
-    if format is not None and "source" not in format.takes:
-        raise RangeError(f"`onto` does not apply to {ending}")
-    document = container.check_edits(asset.document)
-    meshes = {each.mesh for each in baked_meshes(cache, document)}
-    folder = None if asset.source is None else asset.source.folder
-    document = images.embed(decode_draco(document, meshes), folder)
-    if format is not None and "tangents" in format.holds:
-        cache = with_shading_normals(cache, document)
-    return cache, BakeSource(document, 0 if len(asset.clips) == 1 else None)
 
 
 def optimize(
@@ -220,6 +147,7 @@ def bake(
     method: "lbs", "dqs", "cor", …, a name in `anim.SKINNING_METHODS`. fps: frames per second; or times, in seconds;
     without both a frame per key. space: "world" or "mesh". normals, tangents: bake those too.
     rigid: include meshes without a skin. meshes: globs for names of meshes; by default all, of all scenes.
+    Formats with materials get those of the asset; without normals=True, `save` makes lit ones normals from the faces.
     bake("walk.glb", "walk", method="dqs", fps=24).save("walk.usdc")
     """
     asset = as_asset(asset)
@@ -245,7 +173,12 @@ def bake(
         rigid=rigid,
         nodes=nodes,
     )
-    return BakedCache(**{each.name: getattr(cache, each.name) for each in fields(cache)})
+    baked = frozenset(each.node for each in skinning.bakeable_instances(scene, rigid=rigid, nodes=nodes))
+    others = frozenset(() if nodes is None else {each.node for each in scene.instances} - baked)
+    whole = replace(asset, document=replace(asset.document, json=copy_json(asset.document.json)))
+    index = next((i for i, each in enumerate(asset.clips) if each is playing), None)
+    origin = BakeOrigin(whole, playing, index, others, space == "mesh", times is not None)
+    return BakedCache(**{each.name: getattr(cache, each.name) for each in fields(cache)}, origin=origin)
 
 
 def diff(

@@ -6,10 +6,12 @@ import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeAlias
 
 from anim import units
 from anim.errors import RangeError, ShapeError, check_number
+
+Length: TypeAlias = str | float  # "0.5mm", "0.1%", or metres
 
 
 def glob_list(globs: object, name: str) -> list[str]:

@@ -150,6 +150,9 @@ class Asset:
         return f"Asset({self.name!r}, {counts}{', changed' if is_changed else ''})"
 
 
+AssetLike: TypeAlias = Asset | Document | PathName
+
+
 def load(file: PathName | RawBytes | BinaryIO) -> Asset:
     """Return the glTF asset in a .glb or .gltf file.
 
@@ -193,7 +196,7 @@ def save(asset: Asset | Document, path: PathName | BinaryIO) -> None:
     write_file(document, name, asset.source, unchanged=own)
 
 
-def as_asset(value: Asset | Document | PathName) -> Asset:
+def as_asset(value: AssetLike) -> Asset:
     """Return an asset with the JSON as it is now, or the asset of a document or a path."""
     if isinstance(value, Asset):
         return value.reread()

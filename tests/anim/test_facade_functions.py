@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 import anim
 import fixtures
-from tests.files import opened_path
-from tests.textured import looks, textured
 
 Array = NDArray[np.float64]
 
@@ -161,14 +159,3 @@ def _matrix(node: dict[str, Any]) -> Array:
     found[:3, :3] = np.array(rows) * np.array(node.get("scale", (1, 1, 1)), float)
     found[:3, 3] = node.get("translation", (0, 0, 0))
     return found
-
-
-def test_a_bake_keeps_the_materials_of_its_asset(tmp_path: Path) -> None:
-    source = tmp_path / "source.glb"
-    source.write_bytes(textured())
-    asset = anim.load(source)
-    baked = anim.bake(asset, "bend", fps=4)
-    baked.save(tmp_path / "out.glb", onto=asset)
-    assert looks(opened_path(tmp_path / "out.glb")) == looks(opened_path(source))
-    with pytest.raises(anim.RangeError, match=r"`onto` does not apply to \.npz"):
-        baked.save(tmp_path / "out.npz", onto=asset)

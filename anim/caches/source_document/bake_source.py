@@ -68,7 +68,8 @@ def baked_meshes(cache: VertexCache, document: Document) -> tuple[BakedMesh, ...
     raise RangeError(
         f"the cache has {cache.vertex_count} vertices, the meshes of the source have {counts[1]} ({counts[0]} of "
         "skinned and morphed ones)",
-        help="bake the same file, with all vertices in the order of the file",
+        help="bake the same file, with all vertices in the order of the file (`vertex_order` file), or leave the "
+        "materials out (materials=False in Python)",
     )
 
 
