@@ -44,14 +44,23 @@ def vertices(file: Path, times: Sequence[float], *, clip: str | None = None, fps
 
 
 def play(
-    file: Path, times: Sequence[float], *, clip: str | None = None, fps: int = FPS
+    file: Path,
+    times: Sequence[float],
+    *,
+    clip: str | None = None,
+    fps: int = FPS,
+    picture: dict[str, Any] | None = None,
 ) -> tuple[dict[str, Floats], dict[str, Any]]:
-    """Return the `vertices`, and for each object "coordinates", names of its UV layers, and "images", their sizes."""
+    """Return the `vertices`, and for each object "coordinates", names of its UV layers, and "images".
+
+    "images" are the sizes of those behind its base color. picture: also draw one: {"file": a .png, "time": s,
+    "center": (3,), "size": of what is shown}, m, Y up.
+    """
     if reason := missing():
         raise RuntimeError(reason)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.npz"
-        task = json.dumps({"clip": clip, "times": [float(time) for time in times], "fps": fps})
+        task = json.dumps({"clip": clip, "times": [float(time) for time in times], "fps": fps, "picture": picture})
         command = [str(_python()), "-I", str(SCRIPT), str(file.resolve()), task, str(out)]
         own = {**os.environ, "BLENDER_USER_RESOURCES": folder}  # not the preferences of whoever runs this
         run = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, env=own)

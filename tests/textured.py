@@ -232,3 +232,18 @@ def _primitive(accessors: Any, primitive: dict[str, Any]) -> dict[str, Any]:
 def opened(data: bytes) -> Document:
     """Return the document in a GLB."""
     return container.read(data)
+
+
+def without_losses(data: Document) -> Document:
+    """Return a document without what UsdPreviewSurface lacks: vertex colors, scales of normal maps, texture filters.
+
+    The colors of one real file are black.
+    """
+    for mesh in data.json["meshes"]:
+        for primitive in mesh["primitives"]:
+            primitive["attributes"].pop("COLOR_0", None)
+    for material in data.json.get("materials", ()):
+        material.get("normalTexture", {}).pop("scale", None)
+    for sampler in data.json.get("samplers", ()):
+        sampler.pop("magFilter", None)
+    return data

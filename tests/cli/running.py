@@ -6,8 +6,10 @@ import csv
 import io
 import json
 import os
+import re
 import subprocess
 import sys
+from decimal import Decimal
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -99,3 +101,12 @@ def table(content: bytes) -> list[dict[str, str]]:
 
 def _refused(name: str) -> float:
     raise AssertionError(f"JSON holds {name}")
+
+
+def stated_length(err: str) -> float:
+    """Return the error of a summary in metres, as "max 0.41 mm", and half of its last digit."""
+    found = re.search(r"max (\S+) (nm|µm|mm|cm|m)\b", err)
+    assert found is not None
+    digits = Decimal(found[1])
+    half = Decimal(5).scaleb(int(digits.as_tuple().exponent) - 1)
+    return float(digits + half) * {"nm": 1e-9, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}[found[2]]

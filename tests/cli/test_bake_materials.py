@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
-import re
 from dataclasses import replace
-from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +18,7 @@ from anim.measure.error.surface import diagonal
 from anim.model import Mesh
 from fixtures.broken import pieces
 from tests.cli.conftest import Call, Find
-from tests.cli.running import help_line, refusal
+from tests.cli.running import help_line, refusal, stated_length
 from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.judge import needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
@@ -241,15 +239,6 @@ def test_three_shows_the_source_within_the_stated_error(
         assert found.shape == truth.shape
         worst = np.linalg.norm(found - truth, axis=1).max()
         assert worst <= stated + FLOAT_ERROR_PER_DIAGONAL * size
-
-
-def stated_length(err: str) -> float:
-    """The error of a summary in metres, "max 0.41 mm at frames", and half of its last digit."""
-    found = re.search(r"max (\S+) (nm|µm|mm|cm|m) at frames", err)
-    assert found is not None
-    digits = Decimal(found[1])
-    half = Decimal(5).scaleb(int(digits.as_tuple().exponent) - 1)
-    return float(digits + half) * {"nm": 1e-9, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}[found[2]]
 
 
 def test_images_beside_a_gltf_are_inside(call: Call, asset: Find, tmp_path: Path) -> None:

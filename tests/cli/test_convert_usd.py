@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from tests.cli.conftest import Call, Find, Fixture
-from tests.cli.running import help_line, refusal
-from tests.files import opened_path
+from tests.cli.running import help_line, refusal, stated_length
+from tests.files import glb_of, opened_path
 from tests.textured import looks, textured
 from tests.usd import findings, opened_stage
 
@@ -55,6 +58,52 @@ def test_materials_and_images(call: Call, source: Path) -> None:
         if prim.GetTypeName() == "GeomSubset"
     ]
     assert bound == ["/root/materials/material0", "/root/materials/material1"]
+
+
+def test_weights_outside_0_to_1(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    """Blender clamps them, so the targets are scaled; the error is that of usd-core's skinning."""
+    from pxr import UsdSkel
+
+    path, out = tmp_path / "a.glb", tmp_path / "a.usda"
+    document = opened_path(fixture("morph_cube"))
+    clip = reader.clips(document)[0]
+    tracks = tuple(
+        replace(each, values=3 * each.values - 1) if each.path == "weights" else each for each in clip.tracks
+    )
+    path.write_bytes(glb_of(writer.replace_clips(document, {0: replace(clip, tracks=tracks)})))
+    run = call("convert", path, out, "--clip", "#0")
+    assert run.code == 0, run.err
+    assert "scaled or split in two, for weights from 0 to 1" in run.err
+    assert findings(out) == []
+    assert stated_length(run.err) < 1e-5
+    stage = opened_stage(out)
+    (animation,) = (UsdSkel.Animation(prim) for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation))
+    attribute = animation.GetBlendShapeWeightsAttr()
+    weights = np.array([attribute.Get(code) for code in attribute.GetTimeSamples()])
+    assert (weights.min(), weights.max()) == pytest.approx((0, 1), abs=1e-6)
+    assert any(name.endswith("_negative") for name in animation.GetBlendShapesAttr().Get())
+    assert "scaled or split" not in call("convert", fixture("arm"), out, "--clip", "#0").err
+
+
+def test_lights_and_cameras_are_noted(call: Call, source: Path) -> None:
+    document, out = opened_path(source), source.with_name("a.usda")
+    json = document.json
+    json["extensionsUsed"].append("KHR_lights_punctual")
+    json["extensions"]["KHR_lights_punctual"] = {"lights": [{"type": "point"}]}
+    json["nodes"][0]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
+    lit = source.with_name("lit.glb")
+    lit.write_bytes(glb_of(document))
+    for command in ("convert", "bake"):
+        assert call(command, lit, out, "--clip", "bend").err.count("note: lights are left out") == 1
+        err = call(command, source, out, "--clip", "bend").err
+        assert err.count("note: cameras are left out") == 1
+        assert "lights are" not in err
+
+
+def test_a_package_of_moving_points_is_not_for_phones(call: Call, source: Path) -> None:
+    words = "Quick Look on phones does not play moving points"
+    for command, ending, count in (("bake", "usdz", 1), ("bake", "usdc", 0), ("convert", "usdz", 0)):
+        assert call(command, source, source.with_name(f"a.{ending}"), "--clip", "bend").err.count(words) == count
 
 
 def test_images_beside_a_gltf_are_inside(call: Call, asset: Find, tmp_path: Path) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,16 +17,28 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
 from anim.sampling import frame_times
-from anim.skinning.bake import bake
-from cli.units import parse_length
+from anim.skinning.bake import bake, prepare_bake
 from tests.blender import needs_blender, play, vertices
 from tests.cli.conftest import Call, Find
-from tests.files import opened_path
+from tests.cli.running import stated_length
+from tests.files import glb_of, opened, opened_path
+from tests.textured import textured, without_losses
 
 pytestmark = [pytest.mark.slow, needs_blender]
 
 BOUND = 1e-5  # of the diagonal
 BAKES = [("Knight.glb", "Walking_A", ()), ("Knight.glb", "Cheer", ("--rigid",)), ("Fox.glb", "Survey", ())]
+TEXTURED = [
+    ("Fox.glb", "Survey"),
+    ("CesiumMan.glb", "#0"),
+    ("Knight.glb", "Cheer"),
+    ("BitmojiRun.glb", "lbr_run_normal_anm_default"),
+    ("", "bend"),  # two materials, KHR_texture_transform, and an unknown extension
+]
+NUM_IMAGES = {"Fox.glb": 1, "CesiumMan.glb": 1, "Knight.glb": 1, "BitmojiRun.glb": 1, "": 2}  # of base colors
+EXPORTS = [("bake", "glb"), ("bake", "usdz"), ("bake", "abc"), ("convert", "usdz"), ("convert", "usdc")]
+BACKGROUND = 0.95  # of white, less noise
+MAX_DIFFERENCE, MIN_DIFFERENCE = 0.05, 0.1  # of pictures, 0 … 1
 WRITERS = {
     "convert": (),
     "resample": ("--fps", "25"),
@@ -93,32 +105,61 @@ def test_skinned_files(call: Call, asset: Find, tmp_path: Path, name: str, comma
     assert _error(out, _at_keys(document, clip), document, clip.name or None) < BOUND
 
 
-@pytest.mark.parametrize(
-    ("command", "ending"),
-    [("bake", "glb"), ("bake", "usdz"), ("bake", "abc"), ("convert", "usdz"), ("convert", "usdc")],
-)
-@pytest.mark.parametrize(("name", "clip"), [("CesiumMan.glb", "#0"), ("Knight.glb", "Cheer")])
-def test_textures_are_on(
-    call: Call, asset: Find, tmp_path: Path, name: str, clip: str, command: str, ending: str
-) -> None:
-    """Blender links the image to the base color, has texture coordinates, and vertices within the stated error."""
-    source, out = asset(name), tmp_path / f"out.{ending}"
-    rigid = ("--rigid",) if command == "bake" else ()
-    run = call(command, source, out, "--clip", clip, "--fps", 24, *rigid)
-    assert run.code == 0, run.err
-    document = opened_path(source)
+@pytest.mark.parametrize(("name", "clip"), TEXTURED)
+def test_textures_are_on(call: Call, asset: Find, tmp_path: Path, name: str, clip: str) -> None:
+    """Blender has vertices within the stated error, texture coordinates, and pictures like that of the source."""
+    source, unit = tmp_path / "source.glb", tmp_path / "out"
+    document = without_losses(opened_path(asset(name)) if name else opened(textured()))
+    source.write_bytes(glb_of(document))
     played = next(each for each in reader.clips(document) if clip in ("#0", each.name))
-    times = frame_times(played.start, played.end, fps=24)[::7]
-    truth = reorder(
-        bake(reader.scene(document), played, times=times, rigid=True), "blender" if ending == "glb" else "file"
-    )
-    seen, looks = play(out, times.tolist(), fps=24)
-    for each in looks.values():
-        assert len(each["coordinates"]) == 1
-        assert each["images"] == ([] if ending == "abc" else [[1024, 1024]])  # which has no materials
-    stated = re.search(r"max (\S+ \S+?)(,| at frames)", run.err)
-    limit = parse_length(stated[1].replace(" ", ""), "", lambda: 0.0) * 1.05 if stated else 0.0
-    assert _farthest(seen, truth.load_all().positions) <= limit + BOUND * statistics.diagonal(truth)
+    times = frame_times(played.start, played.end, fps=24)
+    truth = bake(reader.scene(document), played, times=times[::7], rigid=True)
+    rest = prepare_bake(reader.scene(document), rigid=True).rest
+    shown: dict[str, Any] = {
+        "time": float(times[len(times) // 2]),
+        "center": ((rest.min(axis=0) + rest.max(axis=0)) / 2).tolist(),
+        "size": float(np.linalg.norm(np.ptp(rest, axis=0))),
+    }
+
+    def blender(path: Path, own: str | None = None) -> tuple[dict[str, Floats], dict[str, Any], Floats]:
+        picture = {**shown, "file": f"{path}.png"}
+        return *play(path, times[::7].tolist(), clip=own, fps=24, picture=picture), pixels(f"{path}.png")
+
+    posed = blender(source, played.name or None)[2]
+    for command, ending in EXPORTS:
+        out = unit.with_name(f"{command}.{ending}")
+        run = call(command, source, out, "--clip", clip, "--fps", 24, *(("--rigid",) if command == "bake" else ()))
+        assert run.code == 0, run.err
+        seen, looks, picture = blender(out)
+        if ending != "abc":  # which has no materials
+            assert difference(picture, posed) < MAX_DIFFERENCE
+            assert sum(len(each["images"]) for each in looks.values()) >= NUM_IMAGES[name]
+        else:
+            assert difference(picture, posed) > MIN_DIFFERENCE
+        textures = [each["coordinates"] for each in looks.values()]
+        assert max(map(len, textures)) == (2 if name == "" and ending != "abc" else 1)
+        expected = reorder(truth, "blender") if ending == "glb" else truth
+        limit = stated_length(run.err) if "max " in run.err else 0.0
+        frames = _with_faces(expected) if command == "convert" else expected.load_all().positions
+        assert _farthest(seen, frames) <= limit + BOUND * statistics.diagonal(truth)
+
+
+def pixels(path: str) -> Floats:
+    """Colors (P, P, 3) of a picture, 0 … 1."""
+    from PIL import Image
+
+    return np.array(Image.open(path).convert("RGB"), np.float64) / 255
+
+
+def difference(a: Floats, b: Floats) -> float:
+    """Mean difference of two pictures, where one of them has something."""
+    return float(np.abs(a - b)[np.minimum(a, b).min(axis=-1) < BACKGROUND].mean())
+
+
+def _with_faces(cache: VertexCache) -> AnyArray:
+    """The vertices of parts with faces."""
+    used = [np.arange(*part.vertices) for part in cache.parts if part.faces[0] < part.faces[1]]
+    return cache.load_all().positions[:, np.concatenate(used)]
 
 
 def _farthest(seen: dict[str, Floats], frames: AnyArray) -> float:

@@ -18,7 +18,7 @@ from tests.browser import ROOT, TIMEOUT_S, chromium, missing_browser, package
 from tests.cli.conftest import Call, Find
 from tests.files import glb_of, opened_path
 from tests.judge import needs_judge
-from tests.textured import textured
+from tests.textured import textured, without_losses
 
 pytestmark = [
     pytest.mark.slow,
@@ -57,15 +57,6 @@ def view(source: Path) -> dict[str, Any]:
     return {"center": ((low + high) / 2).tolist(), "size": float(np.linalg.norm(high - low))}
 
 
-def without_colors(path: Path) -> bytes:
-    """A file without vertex colors, which UsdPreviewSurface lacks: those of one file are black."""
-    document = opened_path(path)
-    for mesh in document.json["meshes"]:
-        for primitive in mesh["primitives"]:
-            primitive["attributes"].pop("COLOR_0", None)
-    return glb_of(document)
-
-
 def difference(a: Floats, b: Floats) -> float:
     return float(np.abs(a - b).mean())
 
@@ -75,7 +66,7 @@ def test_bakes_and_skinned_usd_look_as_their_source(
     call: Call, asset: Find, tmp_path: Path, name: str, clip: str, time: float
 ) -> None:
     source, names = tmp_path / "source.glb", reader.names(opened_path(asset(name)))
-    source.write_bytes(without_colors(asset(name)))
+    source.write_bytes(glb_of(without_losses(opened_path(asset(name)))))
     number = names.index(clip) if clip in names else 0
     baked, skinned, points = tmp_path / "baked.glb", tmp_path / "skinned.usdz", tmp_path / "points.usdz"
     for command, out in (("bake", baked), ("convert", skinned), ("bake", points)):

@@ -17,6 +17,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats
 from anim.caches import frame_blocks, rest_mesh
 from anim.caches.formats.npz import about
+from anim.caches.formats.usd_losses import node_loss_notes
 from anim.caches.formats.usd_materials import UsdMaterials, bind_materials
 from anim.caches.formats.usd_stage import (
     MATERIALS,
@@ -36,6 +37,7 @@ from anim.model import VertexCache
 DEFAULT_FPS = 24.0  # USD's own default
 PRIM = "/mesh"
 TANGENTS = "tangents"  # primvar name used by exporters from glTF
+PHONE_NOTE = "Quick Look on phones does not play moving points, but skinned USD (see `convert`)"
 KEY = "gltf_anim"  # in the layer's custom data: the parts, as in an .npz
 
 
@@ -44,7 +46,9 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
 
     Images of a source lie beside a .usdc or .usda. Raises UnsupportedError without usd-core.
     """
-    notes: list[str] = []
+    notes = [] if writing.source is None else node_loss_notes(writing.source.document.json)
+    if ending == ".usdz" and cache.frame_count > 1:
+        notes.append(PHONE_NOTE)
 
     def build(stage: Any, save_image: SaveImage) -> None:
         _fill(stage, cache, writing.source, save_image, notes.append)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats.usd_stage import vectors
+from anim.exchange.usd_skel.blend_weights import NEGATIVE_SUFFIX, ScaledTarget
 from anim.exchange.usd_skel.prim_names import unique, valid
 from anim.gltf.document import Json
 from anim.model import Mesh, MeshInstance
@@ -57,21 +59,23 @@ def _bind(prim: Any, joints: AnyArray, weights: Floats, to_skeleton: Floats) -> 
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(to_skeleton.T.tolist()))
 
 
-def add_blend_shapes(stage: Any, prim: Any, instance: MeshInstance, about: Json, taken: set[str]) -> list[str]:
-    """Add the morph targets of a mesh as blend shapes; return their names, which no other mesh of the skeleton has.
+def add_blend_shapes(
+    stage: Any, prim: Any, mesh: Mesh, shapes: Sequence[ScaledTarget], about: Json, taken: set[str]
+) -> list[str]:
+    """Add morph targets of a mesh as blend shapes; return their names, which no other mesh of the skeleton has.
 
     about: the mesh in the file, for the names of its targets. taken: names of the skeleton's other blend shapes.
     """
     from pxr import UsdSkel
 
-    path, mesh = prim.GetPath(), instance.mesh
+    path = prim.GetPath()
     own = {each.GetName() for each in prim.GetPrim().GetChildren()}
     names, targets = list[str](), list[Any]()
-    for i, offsets in enumerate(mesh.targets):
-        name = unique(target_name(about, i), own)
+    for each in shapes:
+        name = unique(target_name(about, each.target) + (NEGATIVE_SUFFIX if each.factor < 0 else ""), own)
         own.add(name)
         shape = UsdSkel.BlendShape.Define(stage, path.AppendChild(name))
-        normal_offsets = None if mesh.normal_targets is None or mesh.normals is None else mesh.normal_targets[i]
+        offsets, normal_offsets = _offsets(mesh, each)
         moved = _moved(offsets, normal_offsets)
         shape.CreateOffsetsAttr(vectors(offsets[moved]))
         if normal_offsets is not None:
@@ -93,6 +97,14 @@ def target_name(about: Json, number: int) -> str:
     names = extras.get("targetNames") if isinstance(extras, dict) else None
     given = names[number] if isinstance(names, list) and number < len(names) else None
     return valid(given) if isinstance(given, str) and given else f"target{number}"
+
+
+def _offsets(mesh: Mesh, shape: ScaledTarget) -> tuple[Floats, Floats | None]:
+    """Offsets (V, 3) of a blend shape, and those of its normals."""
+    offsets = shape.factor * mesh.targets[shape.target]
+    if mesh.normal_targets is None or mesh.normals is None:
+        return offsets, None
+    return offsets, shape.factor * mesh.normal_targets[shape.target]
 
 
 def _moved(offsets: Floats, normal_offsets: Floats | None) -> Ints:

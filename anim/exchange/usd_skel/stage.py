@@ -12,6 +12,7 @@ from anim.arrays import Floats
 from anim.caches.formats.usd_materials import UsdMaterials, bind_primitives
 from anim.caches.formats.usd_stage import MATERIALS, ROOT, SaveImage, set_metadata
 from anim.exchange.usd_skel import mesh_prims
+from anim.exchange.usd_skel.blend_weights import scale_targets
 from anim.exchange.usd_skel.node_prims import NodePrims
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup, group_skeletons
 from anim.exchange.usd_skel.skeleton_prims import SkeletonPrim
@@ -51,6 +52,7 @@ class StageBuilder:
         self._posed = PoseSampler(scene.skeleton, clip).posed(times.seconds)
         moving = [track for track in clip.tracks if track.path in NUM_COMPONENTS]
         self._animated = {track.node for track in moving if track.node is not None}
+        self._num_scaled = 0  # morph targets with weights outside 0 … 1
         self.prims: dict[int, Any] = {}
 
     def build(self, save_image: SaveImage, note: Callable[[str], None]) -> None:
@@ -74,6 +76,9 @@ class StageBuilder:
             self._mesh(each, each.node)
         for group in groups:
             self._skeleton(group)
+        if self._num_scaled:
+            counted = "1 morph target is" if self._num_scaled == 1 else f"{self._num_scaled} morph targets are"
+            note(f"{counted} scaled or split in two, for weights from 0 to 1, to which Blender clamps them")
 
     def _skeleton(self, group: SkeletonGroup) -> None:
         """Write a skeleton and its meshes, side by side."""
@@ -93,11 +98,13 @@ class StageBuilder:
             elif instance.node in number:
                 mesh_prims.bind_to_joint(prim, len(instance.mesh.positions), number[instance.node], to_skeleton)
             if len(instance.mesh.targets):
+                shapes = scale_targets(self._weights(instance))
+                self._num_scaled += len({each.target for each in shapes if each.factor != 1})
                 about = self._about(instance)
-                names += mesh_prims.add_blend_shapes(self._stage, prim, instance, about, taken)
-                weights.append(self._weights(instance))
+                names += mesh_prims.add_blend_shapes(self._stage, prim, instance.mesh, shapes, about, taken)
+                weights += [each.weights for each in shapes]
         if names:
-            made.set_blend_weights(names, np.concatenate(weights, axis=1))
+            made.set_blend_weights(names, np.stack(weights, axis=1))
 
     def _mesh(self, instance: MeshInstance, parent: int) -> Any:
         """Write a mesh below the prim of a node, its faces reversed if only one of both nodes mirrors them."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import Floats
+from anim.caches.formats.usd_losses import node_loss_notes
 from anim.caches.formats.usd_stage import SaveImage, package, usual_rate, write_stage
 from anim.caches.storage import Outputs
 from anim.errors import NotFoundError
@@ -95,9 +96,7 @@ def sample_times(clip: Clip, fps: float, *, with_keys: bool = False) -> Floats:
 
 def _left_out(document: Document, scene: Scene, clip: Clip) -> list[str]:
     """Notes on what is not written."""
-    found = []
-    if any("camera" in node for node in document.json.get("nodes", ())):
-        found.append("cameras are left out")
+    found = node_loss_notes(document.json)
     if any(track.path == "pointer" for track in clip.tracks):
         found.append("channels of KHR_animation_pointer are left out")
     if any(len(each.mesh.positions) and not len(each.mesh.faces) for each in scene.instances):
