@@ -158,6 +158,9 @@ def command(
         normals = lit if normals is None else normals
         options = BakeOptions(method.value, blend, bulge_clamp, space.value, normals, tangents, rigid, fps, start, end)
         announce_compiling(voice)
+        bake_notes.clamped_range_note(
+            [(reader.clip_label(clips[i].name, i), clips[i]) for i in numbers], start, end, voice
+        )
         if not rigid and not keeps_nodes(ending) and bakeable_instances(scene, nodes=nodes):
             bake_notes.left_out_note(scene, nodes, voice)
         missed: list[tuple[str, InbetweenError]] = []

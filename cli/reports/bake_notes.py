@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import Scene
+from anim.model import Clip, Scene
 from anim.skinning.analysis.inbetween_error import InbetweenError
 from anim.skinning.analysis.method_deviation import Deviation
 from anim.skinning.bake import bakeable_instances
@@ -15,6 +15,7 @@ from cli import text
 from cli.text import Reporter
 
 MAX_LISTED_JOINTS = 3  # joints that a note lists
+VISIBLE_TIME_S = 1e-3  # s; smaller differences are of rounding
 VISIBLE_ERROR_PER_DIAGONAL = 1e-3  # of the diagonal; smaller errors are invisible
 
 
@@ -50,6 +51,27 @@ def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) ->
     if lost:
         count = sum(len(each.mesh.positions) for each in lost)
         voice.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")
+
+
+def clamped_range_note(
+    clips: Sequence[tuple[str, Clip]], start: float | None, end: float | None, voice: Reporter
+) -> None:
+    """Note the clips, by their labels, that begin after the start of a range or end before its end."""
+    if start is not None:
+        late = [(name, each.start) for name, each in clips if each.start - start > VISIBLE_TIME_S]
+        _note_range("--from", start, "begins", late, voice)
+    if end is not None:
+        early = [(name, each.end) for name, each in clips if end - each.end > VISIBLE_TIME_S]
+        _note_range("--to", end, "ends", early, voice)
+
+
+def _note_range(option: str, given: float, verb: str, found: Sequence[tuple[str, float]], voice: Reporter) -> None:
+    if found:
+        name, time = found[0]
+        others = f", and {len(found) - 1} more" if len(found) > 1 else ""
+        voice.info(
+            f"note: {option} is {text.format_instant(given)}, but {name} {verb} at {text.format_instant(time)}{others}"
+        )
 
 
 def frame_gap_note(

@@ -147,6 +147,18 @@ def test_a_bake_of_a_range(call: Call, source: Path) -> None:
     assert {(round(float(each.times[0]), 6), round(float(each.times[-1]), 6)) for each in clip.tracks} == {(0.2, 0.75)}
 
 
+def test_a_range_beyond_the_clip_is_noted(call: Call, source: Path) -> None:
+    out = source.with_name("out.npz")
+    run = call("bake", source, out, "--clip", "bend", "--from", "-1", "--to", "2")
+    assert run.code == 0
+    assert "note: --from is -1 s, but clip 'bend' begins at 0 s" in run.err
+    assert "note: --to is 2 s, but clip 'bend' ends at 1 s" in run.err
+    assert np.load(out)["times"].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+    many = call("bake", source, source.with_name("{clip}.npz"), "--from", "-1", "--to", "1").err
+    assert "clip 'bend' begins at 0 s, and 1 more" in many
+    assert "--to" not in many
+
+
 def test_convert_cache_onto_is_bake(call: Call, source: Path) -> None:
     baked(call, source, "--clip", "bend")
     cache, onto = source.with_name("a.npz"), source.with_name("onto.glb")
