@@ -59,7 +59,7 @@ def command(
     sampled at a frame rate and interpolated linearly; a .usdz contains its images, for phones and other programs. If
     there are several clips, OUT must contain {clip}, or --clip selects one. Unskinned meshes below joints are bound to
     the skeleton, so that all players move them. The stated error is that of the farthest
-    vertex, skinned by USD, at and half-way between frames.
+    vertex, skinned by USD, at frames and keys and half-way between.
     """
     voice = text.Reporter(quiet)
     if fps is not None and fps <= 0:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anim.arrays import Floats
+from anim.exchange.usd_skel.sample_times import add_times
 from anim.model import Clip, Scene
 from anim.skinning.bake import prepare_bake
 from anim.skinning.bound_mesh import BoundMesh
@@ -26,14 +27,14 @@ class StageError(NamedTuple):
 def stage_error(
     stage: Any, prims: Mapping[int, Any], scene: Scene, clip: Clip, times: Floats, codes: Sequence[float]
 ) -> StageError:
-    """Return the largest error at `times` (F,) s, whose time codes have samples, and half-way between them.
+    """Return the largest error at `times` (F,) s, whose time codes have samples, at all keys, and half-way between.
 
     prims: the Mesh prim of each instance, by node.
     """
     if not prims:
         return StageError(0.0, float(times[0]))
     baker = prepare_bake(scene, rigid=True, nodes=list(prims))
-    measured = _measured_times(times)
+    measured = _measured_times(add_times(times, clip.key_times))
     code_of = dict(zip(times.tolist(), codes, strict=True))
     rate, most = float(stage.GetTimeCodesPerSecond()), StageError(0.0, float(times[0]))
     points = StagePoints(stage)

@@ -9,23 +9,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from anim.arrays import Floats
 from anim.caches.formats.usd_losses import node_loss_notes
-from anim.caches.formats.usd_stage import SaveImage, package, usual_rate, write_stage
+from anim.caches.formats.usd_stage import SaveImage, package, write_stage
 from anim.caches.storage import Outputs
 from anim.errors import NotFoundError
 from anim.exchange.usd_skel.measured_error import StageError, stage_error
+from anim.exchange.usd_skel.sample_times import frame_rate, sample_times
 from anim.exchange.usd_skel.stage import StageBuilder, StageTimes
 from anim.gltf.document import Document
-from anim.model import Clip, Interpolation, Scene
-from anim.sampling.times import check_fps, frame_times, jump_time_before
+from anim.model import Clip, Scene
+from anim.sampling.times import check_fps
 
 USD_FORMATS = (".usdz", ".usdc", ".usda")
 DEFAULT_FPS = 60.0  # of clips whose keys are on the frames of no common rate
-MIN_INTERVAL_S = 5e-7  # s; half the shortest jump
-MAX_KEY_INTERVAL_S = 0.05  # s; of clips with keys farther apart, the rate of the keys is none of frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,29 +65,6 @@ def write(
 
     error, paths = write_stage(outputs, ending, "scene.usdc", build)
     return UsdSkelResult(rate, len(times.seconds), error, tuple(notes), paths)
-
-
-def frame_rate(clip: Clip) -> float | None:
-    """Return the first common rate with all keys but the last of a clip on its frames; None for sparse keys or none."""
-    keys = clip.key_times
-    if len(keys) < 3 or np.diff(keys).max() > MAX_KEY_INTERVAL_S:
-        return None
-    return usual_rate(keys - keys[0])
-
-
-def sample_times(clip: Clip, fps: float, *, with_keys: bool = False) -> Floats:
-    """Return the times (F,) s of samples: frames at a rate, and both sides of the jumps of STEP tracks.
-
-    with_keys: all keys too.
-    """
-    frames = frame_times(clip.start, clip.end, fps=fps)
-    more = [frames, *([clip.key_times] if with_keys else ())]
-    for track in clip.tracks:
-        if track.interpolation is Interpolation.STEP:
-            jumps = track.times[1:][(np.diff(track.values, axis=0) != 0).any(axis=1)]
-            more += [jumps, jump_time_before(jumps)]
-    found = np.unique(np.concatenate(more))
-    return found[np.append(True, np.diff(found) > MIN_INTERVAL_S)] if len(more) > 1 else frames
 
 
 def _left_out(document: Document, scene: Scene, clip: Clip) -> list[str]:

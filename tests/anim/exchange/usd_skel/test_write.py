@@ -14,8 +14,9 @@ from anim.caches.options import ReadOptions
 from anim.caches.registry import reader_for
 from anim.caches.storage import Memory
 from anim.errors import NotFoundError, UnsupportedError
+from anim.exchange.usd_skel.sample_times import sample_times
 from anim.exchange.usd_skel.stage import StageTimes
-from anim.exchange.usd_skel.write import UsdSkelResult, sample_times, write
+from anim.exchange.usd_skel.write import UsdSkelResult, write
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
