@@ -17,6 +17,7 @@ from anim.show.page.comparison import compare_clips, compare_content
 from anim.show.page.notebook import cache_file, document_file
 from anim.show.page.page import EMPTY, SHOWS, PageContent, PageFile, PageView
 from anim.show.page.page import page as make_page
+from anim.show.page.paired_meshes import pair_cache_meshes
 
 Shown: TypeAlias = Asset | Document | PathName | VertexCache
 
@@ -73,8 +74,9 @@ def _view(
 def _compare(one: PageFile, other: PageFile) -> PageContent:
     """Errors over time, where both can be measured by joints; else the page compares vertices by itself."""
     clips = reader.clips(one.document), reader.clips(other.document)
-    if one.is_cache or other.is_cache:
-        return PageContent(partners={0: 0} if len(clips[0]) and len(clips[1]) == 1 else {})
+    if one.cache is not None or other.cache is not None:
+        partners = {0: 0} if len(clips[0]) and len(clips[1]) == 1 else {}
+        return PageContent(partners=partners, meshes=pair_cache_meshes(one, other))
     try:
         ruler = ErrorMetric(reader.scene(one.document), reader.scene(other.document))
         pairs = compare_clips(ruler, *clips)

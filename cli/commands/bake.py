@@ -37,6 +37,7 @@ from cli.workflows.bake_clip import (
     source_options,
 )
 from cli.workflows.bake_jobs import PLACEHOLDERS, bake_jobs, mesh_groups
+from cli.workflows.cache_page import check_cache_page, write_cache_page
 
 LBS = Method("lbs")
 Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc]
@@ -97,6 +98,7 @@ def command(
     preset: caches.PresetOption = None,
     depth: caches.DepthOption = None,
     rest_mesh: caches.RestMeshOption = None,
+    html: common.Html = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
     verbose: common.Verbose = False,
@@ -135,6 +137,8 @@ def command(
     caches.check_supported(ending, normals=bool(normals), tangents=bool(tangents))
     if keep_skeleton and not keeps_nodes(ending):
         raise UsageError(f"--keep-skeleton does not apply to {ending}")
+    moved = {"--space mesh": space is not WORLD, "--up": up is not None, "--vertex-order": vertex_order is not None}
+    check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
     done: list[BakedFile] = []
     with documents.source(input, voice) as source:
         document = source.document
@@ -153,6 +157,8 @@ def command(
         scenes.warn_of_other_scenes(document, source.name, voice, chosen)
         groups = mesh_groups(scene, nodes, output, rigid=rigid)
         jobs = bake_jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
+        if html is not None and len(jobs) > 1:
+            raise UsageError(f"--html shows one clip and one file, not {len(jobs)} (choose with --clip)")
         lit, mapped = default_directions(document, scene, nodes, ending, rigid=rigid)
         tangents = (mapped and normals is not False) if tangents is None else tangents
         normals = lit if normals is None else normals
@@ -217,6 +223,10 @@ def command(
     bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)
     took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
     voice.info(f"{summarize_files(done, method.value)}, {took}")
+    if html is not None and not dry_run:
+        played = [] if jobs[0].clip is None else [f"#{jobs[0].clip}"]
+        written = str(PurePath(done[0].file).with_name(done[0].saved.files[-1]))
+        write_cache_page(html, input, written, played, voice)
 
 
 def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:

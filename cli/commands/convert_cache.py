@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import PurePath
 from typing import Annotated, Any
 
 import typer
@@ -21,6 +22,7 @@ from cli.io import cache_files, documents
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
 from cli.workflows.bake_clip import Output, choose_clip, onto_source
+from cli.workflows.cache_page import check_cache_page, write_cache_page
 
 Cache = Annotated[
     str,
@@ -65,6 +67,7 @@ def command(
     preset: caches.PresetOption = None,
     depth: caches.DepthOption = None,
     rest_mesh: caches.RestMeshOption = None,
+    html: common.Html = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> None:
@@ -100,6 +103,8 @@ def command(
     }
     if onto is None and (clip is not None or keep_skeleton):
         raise UsageError(f"{'--keep-skeleton' if keep_skeleton else '--clip'} needs --onto FILE")
+    moved = {"--up": up is not None, "--vertex-order": vertex_order is not None}
+    check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
     # Raises before any work for options that the format doesn't support.
     caches.write_options(ending, given | {"max_error": max_error, "onto": onto})
     with ExitStack() as stack:
@@ -141,6 +146,8 @@ def command(
         parts.append(f"{len(saved.files)} files")
     parts.append(text.format_duration(time.perf_counter() - began))
     voice.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
+    if html is not None and not dry_run:
+        write_cache_page(html, input, str(PurePath(output).with_name(saved.files[-1])), (), voice)
 
 
 def _changed(

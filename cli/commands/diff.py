@@ -31,7 +31,6 @@ from anim.units import is_zero
 from cli import units
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
-from cli.io.page_files import open_page_file
 from cli.io.page_output import check_page, page_file, write_page
 from cli.options import common
 from cli.options.common import Format
@@ -39,7 +38,8 @@ from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length, plural
-from cli.workflows.page_comparison import compare_files, worst_view
+from cli.workflows.cache_page import write_vertex_page
+from cli.workflows.page_comparison import worst_view
 from cli.workflows.vertex_diff import diff_by_vertex, is_cache
 from cli.workflows.vertex_motion import is_bake_of, pages_of
 
@@ -132,7 +132,7 @@ def command(
         }
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, voice, opened=opened)
         if html is not None:
-            _write_vertex_page(html, old, new, clip, voice)
+            write_vertex_page(html, old, new, clip or (), found_by_vertex, voice)
         _by_vertex(found_by_vertex, format, fail_above, voice, quiet=quiet)
         return
     assert one is not None
@@ -173,15 +173,6 @@ def _write_page(
     content = compare_content(ruler, one[1].clips, other[1].clips, pairs)
     files = [page_file(name, side.document, side.file.size) for name, side in (one, other)]
     write_page(path, files[0], files[1], voice, content=content, view=worst_view(files[0], content))
-
-
-def _write_vertex_page(path: str, old: str, new: str, clip: Sequence[str] | None, voice: Reporter) -> None:
-    """Write the page of a bake and its source, or of caches."""
-    one, other = open_page_file(old, voice), open_page_file(new, voice)
-    names = reader.names(one.document)
-    name = names[Selection(tuple(clip)).chosen_clips(names)[0]] if clip and len(names) > 1 else None
-    content = compare_files(one, other, voice, clip=name)
-    write_page(path, one, other, voice, content=content, view=worst_view(one, content))
 
 
 def _are_bake_and_source(one: _Side, other: _Side) -> bool:

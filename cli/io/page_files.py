@@ -67,7 +67,7 @@ def _of_document(document: Document, name: str, size: int, beside: Resolve | Non
 
 
 def _of_cache(cache: VertexCache, name: str, size: int) -> PageFile:
-    return replace(_converted(convert_cache(cache, PurePath(name).stem), name, size), is_cache=True)
+    return replace(_converted(convert_cache(cache, PurePath(name).stem), name, size), cache=cache)
 
 
 def _converted(source: PageSource, name: str, size: int) -> PageFile:

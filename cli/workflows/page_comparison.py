@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from anim.errors import AnimError
 from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
+from anim.model import Clip, Scene
 from anim.show.page.comparison import compare_clips, compare_content
 from anim.show.page.page import EMPTY, PageContent, PageFile, PageView
+from anim.show.page.paired_meshes import PairedMeshes, pair_cache_meshes, pair_nodes
 from cli.io.scenes import read_scene
 from cli.text import Reporter
-from cli.workflows.vertex_motion import is_bake_of
+from cli.workflows.vertex_motion import is_bake_of, node_pairs
 
 
 def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str | None = None) -> PageContent:
@@ -20,15 +24,30 @@ def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str 
     try:
         old, new = (read_scene(each.document, each.name, voice) for each in (one, other))
         clips = reader.clips(one.document), reader.clips(other.document)
-        if one.is_cache or other.is_cache or is_bake_of(old, new) or is_bake_of(new, old):
-            names = [reader.clip_name(each.name, i) for i, each in enumerate(clips[0])]
-            index = names.index(clip) if clip in names else 0
-            return PageContent(partners={index: 0} if len(clips[1]) == 1 else {})
+        is_cached = one.cache is not None or other.cache is not None
+        if is_cached or is_bake_of(old, new) or is_bake_of(new, old):
+            meshes = pair_cache_meshes(one, other) if is_cached else _pair_bake(old, new)
+            partners = {_played(clips, clip): 0} if len(clips[1]) == 1 else {}
+            return PageContent(partners=partners, meshes=meshes)
         ruler = ErrorMetric(old, new)
         return compare_content(ruler, *clips, compare_clips(ruler, *clips))
     except AnimError as error:
         voice.info(f"note: without errors over time: {error}")
         return EMPTY
+
+
+def _played(clips: tuple[Sequence[Clip], Sequence[Clip]], clip: str | None) -> int:
+    """Index of the first file's clip by its name, else by that of the second file's only clip, else 0."""
+    names = [reader.clip_name(each.name, i) for i, each in enumerate(clips[0])]
+    return next((names.index(name) for name in (clip, clips[1][0].name) if name in names), 0)
+
+
+def _pair_bake(old: Scene, new: Scene) -> PairedMeshes:
+    """Meshes of a file and its bake, in either order."""
+    if is_bake_of(old, new):
+        return pair_nodes(node_pairs(old, new))
+    baked, source = pair_nodes(node_pairs(new, old))
+    return source, baked
 
 
 def worst_view(file: PageFile, content: PageContent) -> PageView:

@@ -96,6 +96,12 @@ def is_bake_of(old: Scene, new: Scene) -> bool:
     )
 
 
+def node_pairs(old: Scene, new: Scene) -> Iterator[tuple[int, int]]:
+    """Yield the nodes of meshes that correspond by name and number of vertices."""
+    for i, k in _pairs(old, new):
+        yield old.instances[i].node, new.instances[k].node
+
+
 def common_times(old: VertexMotion, new: VertexMotion, fps: float) -> Floats:
     """Return all keys of both, the middles between them and a grid, in the range of both."""
     start, end = max(old.keys[0], new.keys[0]), min(old.keys[-1], new.keys[-1])

@@ -1,57 +1,54 @@
-// node visit.mjs PLAYWRIGHT CHROMIUM [PAGE.html PAGE2.html …]: tries each page in Chromium, with keys, scrubber and touch.
+// node visit.mjs TASK: tries pages in a browser, with keys and scrubber; in Chromium also by touch on a phone.
 //
-// Writes a JSON list on stdout, for each page {file, ready_ms, words, faults, worst}: console messages and requests,
-// checks that failed, and of two files [{clip, time, error}] at the times that the page names as the worst.
-import { pathToFileURL } from "node:url";
+// TASK is JSON: {engine, library, executable, shots, files}. Writes a JSON list on stdout, for each page {file, ready_ms,
+// words, faults, worst}: console messages and requests, checks that failed, and of two files [{clip, time, error}] at
+// the times that the page names as the worst. shots: folder for a picture of each page, "" for none.
+// Exit code 3: the browser does not start, or has no WebGL.
 import { basename, join } from "node:path";
+import { launch } from "./drivers.mjs";
 
-const [playwright, executablePath, shots, ...files] = process.argv.slice(2);
-const { chromium, devices } = (await import(pathToFileURL(join(playwright, "index.js")))).default;
-const ARGS = [
-  "--no-sandbox",
-  "--use-angle=swiftshader",
-  "--enable-unsafe-swiftshader",
-  "--disable-background-networking",
-  "--disable-component-update",
-  "--disable-sync",
-  "--no-first-run",
-];
+const { engine, library, executable, shots, files } = JSON.parse(process.argv[2]);
 const READY_MS = 60000;
-const PHONE = devices["Pixel 7"];
-const browser = await chromium.launch({ executablePath, args: ARGS });
+const READY = "document.documentElement.dataset.ready || document.documentElement.dataset.error || ''";
+const NO_ENGINE = 3; // exit code
+const browser = await launch(engine, { library, executable }).catch((error) => leave(error.stack ?? error));
 
-/** A page in a context without network. Words: everything it says or asks for. */
-async function open(file, hash, device = { viewport: { width: 1100, height: 700 } }) {
-  const context = await browser.newContext({ ...device, offline: true });
-  const page = await context.newPage();
-  const words = [];
-  page.on("console", (message) => words.push(`${message.type()}: ${message.text()}`));
-  page.on("pageerror", (error) => words.push(`error: ${error.stack}`));
-  page.on("request", (request) => {
-    const url = request.url();
-    if (!/^(data|blob):/.test(url) && !url.startsWith(pathToFileURL(file).href)) words.push(`request: ${url}`);
-  });
+function leave(reason) {
+  process.stderr.write(`${engine} does not start: ${reason}`);
+  process.exit(NO_ENGINE);
+}
+
+async function until(page, code) {
+  const end = Date.now() + READY_MS;
+  while (!(await page.run(code))) {
+    if (Date.now() > end) throw new Error(`not within ${READY_MS} ms: ${code}`);
+    await new Promise((done) => setTimeout(done, 20));
+  }
+}
+
+async function open(file, hash, isPhone = false) {
   const began = Date.now();
-  await page.goto(pathToFileURL(file).href + hash);
-  const isDone = () => document.documentElement.dataset.ready || document.documentElement.dataset.error;
-  await page.waitForFunction(isDone, null, { timeout: READY_MS });
-  return { page, words, ms: Date.now() - began, close: () => context.close() };
+  const page = await browser.open(file, hash, isPhone);
+  await until(page, READY);
+  return { page, ms: Date.now() - began };
 }
 
 async function tryDesktop(file, faults) {
-  const { page, words, ms, close } = await open(file, "#t=0&show=");
+  const { page, ms } = await open(file, "#t=0&show=");
   const expect = (isTrue, fault) => isTrue || faults.push(fault);
-  const get = (code) => page.evaluate(code);
-  const time = () => get("player.state.time");
+  const get = page.run;
   const near = async (expected, what) => {
-    const got = await time();
+    const got = await get("player.state.time");
     expect(Math.abs(got - expected) < 2e-3, `${what}: ${got} instead of ${expected}`);
   };
   const press = async (key) => {
-    await page.keyboard.press(key);
-    await get("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
+    const before = await get("player.frames");
+    await page.press(key);
+    await until(page, `player.frames > ${before} + 1`);
   };
-  expect(!(await get("document.documentElement.dataset.error")), "does not load");
+  const error = await get("document.documentElement.dataset.error ?? ''");
+  if (/WebGL/.test(error)) await browser.close().then(() => leave(error));
+  expect(!error, `does not load: ${error}`);
   const duration = await get("player.duration");
   const clips = await get("player.sides[0].clips.length");
   if (clips) {
@@ -71,11 +68,13 @@ async function tryDesktop(file, faults) {
     await near(duration, "End");
     await press("Home");
     await press(" ");
-    await page.waitForFunction(() => player.state.time > 0, null, { timeout: READY_MS });
+    await until(page, "player.state.time > 0");
     await press(" ");
     expect(!(await get("player.state.playing")), "pauses");
-    await page.locator("#scrub input").fill("0.5");
-    await near(duration / 2, "scrubber");
+    await page.click("#scrub input"); // its center
+    const middle = await get("player.state.time / player.duration");
+    expect(Math.abs(middle - 0.5) < 0.01, `scrubber: ${middle} instead of the middle`);
+    await press("Home");
     const clip = await get("player.state.clip");
     await press("n");
     expect((await get("player.state.clip")) === (clip + 1) % clips, "next clip");
@@ -97,11 +96,11 @@ async function tryDesktop(file, faults) {
   expect((await get("document.documentElement.dataset.theme")) === "dark", "dark");
   await press("f");
   await press("?");
-  expect((await page.locator("dialog[open] kbd").count()) > 20, "sheet of keys");
+  expect((await get(`document.querySelectorAll("dialog[open] kbd").length`)) > 20, "sheet of keys");
   await press("Escape");
-  const node = page.locator("[data-node]").first();
-  if (await node.count()) {
-    await node.click();
+  expect(!(await get(`document.querySelectorAll("dialog[open]").length`)), "sheet closes");
+  if (await get(`document.querySelectorAll("[data-node]").length`)) {
+    await page.click("[data-node]");
     expect((await get("player.state.node")) !== null, "chooses a node");
   }
   if (await get("player.sides.length > 1")) {
@@ -111,40 +110,53 @@ async function tryDesktop(file, faults) {
       await press("b");
       expect((await get("player.state.side")) === side, `side ${side}`);
     }
+    const scale = await get("player.state.heatScale");
+    await press("]");
+    expect((await get("player.state.heatScale")) === 2 * scale, "scale of heat");
+    await press("[");
   }
   const worst = await get(`(facts => player.sides.length < 2 ? [] : facts.panels.flatMap(panel => panel.rows)
     .filter(row => row.link).map(({link}) => {
       player.follow(link);
       return {clip: link.clip, time: link.time, error: player.worst().error};
     }))(JSON.parse(document.getElementById("facts").textContent))`);
-  if (shots) await page.screenshot({ path: join(shots, basename(file).replace(/html$/, "png")) });
-  await page.waitForFunction(() => location.hash.includes("theme=dark"), null, { timeout: READY_MS });
-  await close();
-  return { words, ready_ms: ms, worst };
+  await until(page, `location.hash.includes("theme=dark")`);
+  await page.close();
+  return { words: page.words, ready_ms: ms, worst };
+}
+
+/** Keep a picture of the page in the middle of its first clip, or at its largest error. */
+async function keepPicture(file) {
+  const { page } = await open(file, "");
+  await page.run(`(player.sides.length < 2 && player.update({ playing: false, time: player.duration / 2 }), true)`);
+  const before = await page.run("player.frames");
+  await until(page, `player.frames > ${before} + 1`);
+  await page.shot(join(shots, basename(file).replace(/html$/, `${engine}.png`)));
+  await page.close();
 }
 
 async function tryPhone(file, faults) {
-  const { page, words, close } = await open(file, "", PHONE);
+  const { page } = await open(file, "", true);
   const expect = (isTrue, fault) => isTrue || faults.push(`phone: ${fault}`);
-  const get = (code) => page.evaluate(code);
-  await page.locator("#menu").tap();
-  const clip = page.locator("[data-clip]").last();
-  if (await clip.count()) {
-    await clip.tap();
-    expect((await get("player.state.clip")) === (await get("player.sides[0].clips.length")) - 1, "taps a clip");
-    if (await get("player.state.playing")) await page.locator("#play").tap();
+  const get = page.run;
+  await page.click("#menu");
+  const clips = await get(`document.querySelectorAll("[data-clip]").length`);
+  if (clips) {
+    await page.click(`[data-clip="${clips - 1}"]`);
+    expect((await get("player.state.clip")) === clips - 1, "taps a clip");
+    if (await get("player.state.playing")) await page.click("#play");
     expect(!(await get("player.state.playing")), "taps pause");
-  } else await page.locator("#menu").tap();
-  if (!(await get(`player.state.show.has("bones")`))) await page.locator("#show-bones").tap();
+  } else await page.click("#menu");
+  if (!(await get(`player.state.show.has("bones")`))) await page.click("#show-bones");
   expect(await get(`player.state.show.has("bones")`), "taps skeleton");
-  await page.locator("#menu").tap();
+  await page.click("#menu");
   const small = await get(`[...document.querySelectorAll("button, select, summary, input")]
     .filter(each => each.checkVisibility() && each.getBoundingClientRect().height < 44)
     .map(each => each.id || each.textContent)`);
   expect(!small.length, `smaller than 44 px: ${small}`);
   expect(await get("document.documentElement.scrollWidth <= innerWidth"), "scrolls sideways");
-  await close();
-  return words;
+  await page.close();
+  return page.words;
 }
 
 const found = [];
@@ -152,7 +164,8 @@ for (const file of files) {
   const faults = [];
   try {
     const { words, ready_ms, worst } = await tryDesktop(file, faults);
-    words.push(...(await tryPhone(file, faults)));
+    if (engine === "chromium") words.push(...(await tryPhone(file, faults)));
+    if (shots) await keepPicture(file);
     found.push({ file, ready_ms, words, faults, worst });
   } catch (error) {
     found.push({ file, ready_ms: null, words: [], faults: [...faults, String(error)], worst: [] });

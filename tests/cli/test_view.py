@@ -210,7 +210,29 @@ def test_a_bake_beside_its_source(fixture: Fixture, call: Call, tmp_path: Path) 
     said = facts((tmp_path / "d.html").read_bytes())
     assert said["view"]["clip"] == "wave"
     assert list(said["partners"].values()) == [0]
-    assert not said["errors"]
+    assert said["meshes"][1] is None
+    (curve,) = said["errors"].values()
+    report = json.loads(call("diff", fixture("biped"), cache, "--clip", "wave", "--format", "json").product())
+    assert curve["max"] == report["max_error_m"] == pytest.approx(max(curve["errors"]), rel=1e-6)
+    assert said["view"]["t"] == report["clips"][0]["time_s"]
+
+
+@needs_page
+def test_bakes_and_conversions_write_the_page_of_diff(
+    fixture: Fixture, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    run = call("bake", fixture("biped"), "out/w.glb", "--clip", "wave", "--fps", "8", "--html", "b.html")
+    assert "b.html  " in run.err
+    said = facts((tmp_path / "b.html").read_bytes())
+    assert [each["name"] for each in said["files"]] == ["biped.glb", "w.glb"]
+    assert said["meshes"][0]
+    assert [each["title"] for each in said["panels"]] == ["Largest errors"]
+    assert "c.html  " in call("convert-cache", "out/w.glb", "out/w.npz", "--html", "c.html").err
+    said = facts((tmp_path / "c.html").read_bytes())
+    assert [each["name"] for each in said["files"]] == ["w.glb", "w.npz"]
+    assert said["view"]["show"] == ["heat"]
 
 
 @needs_page
@@ -221,6 +243,10 @@ def test_a_bake_beside_its_source(fixture: Fixture, call: Call, tmp_path: Path) 
         (("inspect", "-", "--html", "p.html"), "one file with a name"),
         (("inspect", "a.glb", "--html", "p.png"), "no .html file"),
         (("optimize", "a.glb", "b.glb", "--html", "p.html", "--curve", "c.csv"), "--curve"),
+        (("bake", "a.glb", "-", "--html", "p.html"), "read again"),
+        (("bake", "a.glb", "b.npz", "--up", "z", "--html", "p.html"), "no --up"),
+        (("bake", "a.glb", "{clip}.npz", "--html", "p.html"), "one clip and one file, not 2"),
+        (("convert-cache", "a.npz", "b.abc", "--html", "p.html"), "reads OUT again"),
     ],
 )
 def test_pages_that_reports_refuse(

@@ -34,6 +34,7 @@ class Correspondence:
     unskinned, skinned: names of meshes with a skin in the first or second scene only. reweighted: names of meshes whose
     vertices agree, but not their joints, weights or morph targets. reduced: names of meshes that lost primitives.
     lost: names of meshes that the second scene lacks. has_meshes, had_meshes: False if only one scene has vertices.
+    partners: nodes of both scenes whose meshes have the same vertices in the same order.
     """
 
     nodes: Ints
@@ -46,6 +47,7 @@ class Correspondence:
     has_meshes: bool = True
     had_meshes: bool = True
     lost: tuple[str, ...] = ()
+    partners: tuple[tuple[int, int], ...] = ()
 
 
 def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Correspondence:
@@ -55,7 +57,8 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
     the first scene's clip moves the node, that is an error.
     """
     if other is scene:
-        return Correspondence(np.arange(len(scene.skeleton)), [(surface, None) for surface in surfaces])
+        same = tuple((each.node, each.node) for each in scene.instances)
+        return Correspondence(np.arange(len(scene.skeleton)), [(surface, None) for surface in surfaces], partners=same)
     pairing = _SceneMatcher(scene, other, name_matching.match_nodes(scene, other))
     instances = [instance for instance in scene.instances if len(instance.mesh.positions)]
     if not instances:
@@ -65,6 +68,7 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
     unskinned: list[str] = []
     skinned: list[str] = []
     reweighted, reduced, by_vertex = [], [], True
+    partners: list[tuple[int, int]] = []
     for number, (surface, instance) in enumerate(zip(surfaces, instances, strict=True)):
         partner = pairing.partner(number, instance)
         bare = None
@@ -81,6 +85,8 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
         found.append((surface, carried))
         if partner is not None and not _deform_alike(instance, partner, carried):
             reweighted.append(surface.name)
+        if partner is not None:
+            partners.append((instance.node, partner.node))
         by_vertex = by_vertex and partner is not None
     return Correspondence(
         pairing.nodes,
@@ -92,6 +98,7 @@ def match_scenes(scene: Scene, other: Scene, surfaces: list[Surface]) -> Corresp
         tuple(reduced),
         pairing.has_meshes,
         lost=tuple(surfaces[i].name for i in pairing.lost(instances)),
+        partners=tuple(partners),
     )
 
 

@@ -17,7 +17,8 @@ MAX_SAMPLES = 16_000_000  # maximum number of vertices × frames for p99
 class VertexDistance:
     """Distances in m. max_error at vertex and time (s); mean over all vertices and frames, p99 over up to MAX_SAMPLES.
 
-    diagonal: size of the first model. frames: number of compared times.
+    diagonal: size of the first model. frames: number of compared times. times, errors: of each frame (s), the largest
+    distance.
     """
 
     max_error: float
@@ -27,6 +28,8 @@ class VertexDistance:
     p99: float
     diagonal: float
     frames: int
+    times: tuple[float, ...] = ()
+    errors: tuple[float, ...] = ()
 
 
 def vertex_distance(
@@ -38,15 +41,18 @@ def vertex_distance(
     """
     worst, time, vertex, total, count = 0.0, float(times[0]), -1, 0.0, 0
     samples: list[AnyArray] = []
+    errors: list[float] = []
     for at, first, second in zip(times.tolist(), old, new, strict=True):
         if first.shape != second.shape:
             raise ShapeError(f"{len(first)} vertices and {len(second)} (expected the same)")
         distance = np.linalg.norm(first.astype(np.float64) - second, axis=1)
         far = int(distance.argmax())
+        errors.append(float(distance[far]))
         if distance[far] > worst:
             worst, time, vertex = float(distance[far]), at, far
         total, count = total + float(distance.sum()), count + len(distance)
         step = max(1, len(times) * len(distance) // MAX_SAMPLES)
         samples.append(distance[::step].astype(np.float32))
     p99 = float(np.percentile(np.concatenate(samples), 99)) if samples else 0.0
-    return VertexDistance(worst, time, vertex, total / max(count, 1), min(p99, worst), diagonal, len(samples))
+    curve = tuple(times.tolist()), tuple(errors)
+    return VertexDistance(worst, time, vertex, total / max(count, 1), min(p99, worst), diagonal, len(samples), *curve)

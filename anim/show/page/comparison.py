@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,10 +11,12 @@ import numpy as np
 from anim.arrays import Floats
 from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.name_matching import match_by_name_then_order
+from anim.measure.compare.vertex_distance import VertexDistance
 from anim.measure.error.error_curve import ErrorCurve, error_curve
 from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.model import Clip
 from anim.show.page.page import ClipError, PageContent, PageLink, PagePanel, PageRow
+from anim.show.page.paired_meshes import pair_nodes
 from anim.units import format_number
 
 MAX_POINTS = 400  # of an error curve on the page
@@ -69,7 +71,22 @@ def compare_content(
     if not rows:
         rows = (PageRow(("no vertex moves differently",)),)
     panel = PagePanel("Largest errors", rows, hot=len(rows[0].cells) - 1)
-    return PageContent(subtitle, (panel,), errors, {pair.old: pair.new for pair in found})
+    partners = {pair.old: pair.new for pair in found}
+    return PageContent(subtitle, (panel,), errors, partners, pair_nodes(ruler.pairs.partners))
+
+
+def vertex_content(content: PageContent, found: VertexDistance, *, clip: int, label: str) -> PageContent:
+    """Return the content of a bake beside its source with the errors that were measured vertex by vertex.
+
+    clip: index in the first file. label: of the clip and the mesh with the largest error.
+    """
+    if found.max_error <= MIN_ERROR_PER_DIAGONAL * found.diagonal:
+        panel = PagePanel("Largest errors", (PageRow(("no vertex moves differently",)),))
+        return replace(content, panels=(*content.panels, panel), errors={clip: ClipError(0.0)})
+    cells = (label, f"p99 {_length(found.p99)}", f"{found.time:.3f} s", _length(found.max_error))
+    panel = PagePanel("Largest errors", (PageRow(cells, PageLink(clip, None, found.time)),), hot=len(cells) - 1)
+    curve = _reduce(np.array(found.times), np.array(found.errors))
+    return replace(content, panels=(*content.panels, panel), errors={clip: ClipError(found.max_error, *curve)})
 
 
 def _row(ruler: ErrorMetric, old: Sequence[Clip], pair: ClipPair) -> PageRow:

@@ -29,7 +29,7 @@ def document_file(document: Document, source: Source | None = None) -> PageFile:
 def cache_file(cache: VertexCache, name: str = "cache") -> PageFile:
     """Return a vertex cache as a file of a page. Raises UnsupportedError for one that is too large."""
     converted = convert_cache(cache, name)
-    return PageFile(converted.document, name, notes=tuple(converted.notes), is_cache=True)
+    return PageFile(converted.document, name, notes=tuple(converted.notes), cache=cache)
 
 
 def frame(make: Callable[[], bytes], text: str) -> str:

@@ -10,15 +10,17 @@ import json
 import string
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 from anim.gltf.document import Document
 from anim.gltf.io.buffers import Resolve
+from anim.model import VertexCache
 from anim.show.page.embedding import embed
 from anim.show.page.resources import START, STYLE, TEMPLATE, read_script, read_text
 
 SHOWS = ("bones", "wire", "onion", "clay", "curves", "heat")
 COMPRESSION = 9
+MeshNodes: TypeAlias = tuple[int, ...] | None
 # Nothing but the page's own two scripts, known by their hashes, runs; nothing is loaded from anywhere
 POLICY = (
     "default-src 'none'; script-src {scripts} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
@@ -31,7 +33,7 @@ class PageFile:
     """A file on a page.
 
     document: what is shown. name: for headings. size: bytes of the file, 0 if unknown. notes: lines about differences
-    to the file, beside those of `embed`. resolve: see `embed`. is_cache: whether it was a vertex cache, without joints.
+    to the file, beside those of `embed`. resolve: see `embed`. cache: the vertex cache that the document was made of.
     """
 
     document: Document
@@ -39,7 +41,7 @@ class PageFile:
     size: int = 0
     notes: tuple[str, ...] = ()
     resolve: Resolve | None = None
-    is_cache: bool = False
+    cache: VertexCache | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +96,15 @@ class PageContent:
     """Contents of a page besides its files.
 
     errors: by index of a clip of the first file. partners: index of the second file's clip by that of the first.
+    meshes: nodes of each file whose meshes correspond vertex by vertex, in this order; None: all meshes of a file.
+    Without `meshes` the page pairs meshes by name and number of vertices.
     """
 
     subtitle: str = ""
     panels: Sequence[PagePanel] = ()
     errors: Mapping[int, ClipError] = field(default_factory=dict)
     partners: Mapping[int, int] = field(default_factory=dict)
+    meshes: tuple[MeshNodes, MeshNodes] | None = None
 
 
 EMPTY = PageContent()
@@ -173,6 +178,7 @@ def _content(content: PageContent) -> dict[str, Any]:
             i: {"max": each.max, "times": each.times, "errors": each.errors} for i, each in content.errors.items()
         },
         "partners": dict(content.partners),
+        **({} if content.meshes is None else {"meshes": content.meshes}),
     }
 
 

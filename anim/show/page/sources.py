@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
@@ -11,6 +12,7 @@ import numpy as np
 from anim.caches.options import WriteOptions
 from anim.caches.registry import writer_for
 from anim.caches.storage import Memory
+from anim.caches.transforms.statistics import diagonal
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import FormatError, RangeError, UnsupportedError
 from anim.exchange.euler.evaluate import bounding_size, skeleton
@@ -27,6 +29,7 @@ from anim.gltf.io import container
 from anim.model import VertexCache
 
 ANGLE_TOLERANCE_RAD = math.radians(0.05)  # as `from-euler`
+TOLERANCES_PER_DIAGONAL = (1e-5, 1e-3)  # of morph targets; the second where the first needs too many
 MAX_CACHE_BYTES = 400_000_000  # of positions; a browser needs several times this
 MAX_FLIPBOOK_BYTES = 60_000_000  # of positions; pages store every frame
 DEFAULT_NAME = "motion"  # of a clip from a pipe, as `from-euler`
@@ -62,7 +65,7 @@ def read_curves(data: bytes, *, name: str = "", options: TrackReadOptions = DEFA
 
 
 def convert_cache(cache: VertexCache, name: str = "cache") -> PageSource:
-    """Return a vertex cache as a document with morph targets, within 0.1 % of its diagonal, Y up.
+    """Return a vertex cache as a document with morph targets, within 0.001 % of its diagonal, or 0.1 %; Y up.
 
     Where 256 morph targets do not suffice, every frame is a mesh of its own, shown one at a time. name: of the clip.
     Raises UnsupportedError for caches that are too large for a browser.
@@ -71,19 +74,27 @@ def convert_cache(cache: VertexCache, name: str = "cache") -> PageSource:
     size = 12 * cache.frame_count * cache.vertex_count
     if size > MAX_CACHE_BYTES:
         raise _too_large(cache, size)
-    memory = Memory("cache.glb")
-    try:
-        written = writer_for(".glb")(cache, memory, WriteOptions())
-    except RangeError:
-        if size > MAX_FLIPBOOK_BYTES:
-            raise _too_large(cache, size) from None
-        memory = Memory("cache.glb")
-        written = writer_for(".glb")(cache, memory, WriteOptions(layout="flip-scale"))
-    document = container.read(np.frombuffer(memory.files["cache.glb"], np.uint8))
-    notes = [f"morph targets: within {written.max_error:.3g} m of the cache"] if written.max_error else []
+    data, error = _encoded(cache, size)
+    document = container.read(np.frombuffer(data, np.uint8))
+    notes = [f"morph targets: within {error:.3g} m of the cache"] if error else []
     animations = [{**each, "name": name} for each in document.json.get("animations", [])]
     json = {**document.json, "animations": animations} if animations else document.json
     return PageSource(replace(document, json=json), notes)
+
+
+def _encoded(cache: VertexCache, size: int) -> tuple[bytes, float]:
+    """GLB with as exact morph targets as 256 allow, else with a mesh per frame; and its error in m."""
+    scale = diagonal(cache)
+    for tolerance in TOLERANCES_PER_DIAGONAL:
+        memory = Memory("cache.glb")
+        with suppress(RangeError):
+            written = writer_for(".glb")(cache, memory, WriteOptions(max_error=tolerance * scale or None))
+            return memory.files["cache.glb"], written.max_error or 0.0
+    if size > MAX_FLIPBOOK_BYTES:
+        raise _too_large(cache, size)
+    memory = Memory("cache.glb")
+    writer_for(".glb")(cache, memory, WriteOptions(layout="flip-scale"))
+    return memory.files["cache.glb"], 0.0
 
 
 def _too_large(cache: VertexCache, size: int) -> UnsupportedError:

@@ -3,6 +3,7 @@
 import { Quaternion } from "three";
 import { begin, ink } from "./canvas.js";
 import { formatNumber } from "./format.js";
+import { isCubic } from "./side.js";
 import { INSET } from "./timeline.js";
 
 const SAMPLES = 320;
@@ -141,7 +142,9 @@ function drawTangent(context, tangents, times, k, c, value, x, y) {
 /** Values of a track over time, as numbers or as degrees from the rest rotation. */
 function graph({ path, track }, rest, unit) {
   const width = track.getValueSize() / (isCubic(track) ? 3 : 1);
-  const interpolant = track.createInterpolant(new Float32Array(width));
+  // As stored: rotations are played by normalized copies
+  const shown = unit === "values" && track.stored ? Object.create(track, { values: { value: track.stored } }) : track;
+  const interpolant = shown.createInterpolant(new Float32Array(width));
   const times = [...track.times];
   const raw = (time) => [...interpolant.evaluate(Math.max(times[0], Math.min(time, times.at(-1))))];
   if (path === "rotation" && unit === "degrees") {
@@ -151,10 +154,6 @@ function graph({ path, track }, rest, unit) {
   const tangents = isCubic(track) ? tangentsOf(track, width) : null;
   const suffix = UNITS[path] && path === "translation" ? ` ${UNITS[path]}` : "";
   return { times, size, unit: suffix, at: (time) => raw(time).slice(0, size), tangents };
-}
-
-function isCubic(track) {
-  return Boolean(track.createInterpolant.isInterpolantFactoryMethodGLTFCubicSpline);
 }
 
 /** Slopes per second; glTF stores in-tangent, value and out-tangent of each key. */

@@ -6,7 +6,7 @@ import { Curves } from "./curves.js";
 import { facts } from "./data.js";
 import { $ } from "./dom.js";
 import { formatLength, roundUp } from "./format.js";
-import { MAX_LIVE_VERTICES, countVertices, measure, nodeColors, paint, pairMeshes } from "./heat.js";
+import { MAX_LIVE_VERTICES, MeshPairs, measure, nodeColors, paint } from "./heat.js";
 import { applyMaterials } from "./materials.js";
 import { Onion } from "./onion.js";
 import { Stage } from "./stage.js";
@@ -24,12 +24,14 @@ export class Player {
     this.sides = sides;
     this.stage = new Stage($("#view canvas"), sides);
     this.extras = sides.map((side) => ({ bones: new Bones(side), onion: new Onion(side) }));
-    this.pairs = pairMeshes(sides);
-    this.isLive = countVertices(this.pairs) <= MAX_LIVE_VERTICES;
+    for (const side of sides) side.pose(0);
+    this.pairs = new MeshPairs(sides, facts.meshes);
+    this.isLive = this.pairs.vertexCount <= MAX_LIVE_VERTICES;
     this.timeline = new Timeline($("#scrub"), (time) => this.seek(time, { pause: true }));
     this.curves = new Curves($("#curves"), (time) => this.seek(time, { pause: true }));
     this.isDirty = true;
     this.last = 0;
+    this.frames = 0; // animation frames so far
     this.stage.controls.addEventListener("change", () => (this.isDirty = true));
   }
 
@@ -88,7 +90,7 @@ export class Player {
   /** Largest distance between both files in the present pose. */
   worst() {
     for (const side of this.sides) side.pose(state.time);
-    return measure(this.pairs);
+    return measure(this.pairs.spans());
   }
 
   resetHeatScale() {
@@ -109,6 +111,7 @@ export class Player {
   tick(now) {
     const seconds = Math.min((now - this.last) / 1000, MAX_TICK_S);
     this.last = now;
+    this.frames++;
     if (state.playing) this.advance(seconds);
     if (this.stage.controls.update() || this.isDirty) {
       this.isDirty = false;
@@ -137,16 +140,16 @@ export class Player {
     pin.hidden = true;
     if (this.sides.length < 2) return null;
     let worst = null;
-    if (isShown && (this.isLive || !state.playing)) worst = paint(this.pairs, state.heatScale);
-    else if (!state.playing) worst = measure(this.pairs);
-    $("#worst").textContent = worst?.mesh ? formatLength(worst.error) : this.pairs.length ? "" : "other vertices";
+    if (isShown && (this.isLive || !state.playing)) worst = paint(this.pairs.spans(), state.heatScale);
+    else if (!state.playing) worst = measure(this.pairs.spans());
+    $("#worst").textContent = worst?.mesh ? formatLength(worst.error) : this.pairs.isEmpty ? "other vertices" : "";
     if (worst?.mesh && isShown) {
       const spot = this.stage.project(worst.point, this.sides[1]);
       pin.hidden = !spot;
       if (spot) pin.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
       pin.firstElementChild.textContent = formatLength(worst.error);
     }
-    return isShown && !this.pairs.length ? nodeColors(this.sides, state.heatScale) : null;
+    return isShown && this.pairs.isEmpty ? nodeColors(this.sides, state.heatScale) : null;
   }
 
   /** The chosen node of A in a side: the same one, or that of the same name. */
@@ -174,7 +177,7 @@ export class Player {
   }
 
   applyMaterials() {
-    const heated = new Set(state.show.has("heat") ? this.pairs.map(([, mesh]) => mesh) : []);
+    const heated = new Set(state.show.has("heat") ? this.pairs.heated : []);
     for (const side of this.sides) applyMaterials(side, state.show, heated);
   }
 

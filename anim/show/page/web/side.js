@@ -18,7 +18,9 @@ export class Side {
       if (object.isMesh) this.meshes.push(object);
     });
     for (const mesh of this.meshes) prepareMesh(mesh);
+    for (const clip of this.clips) clip.tracks.forEach(normalizeRotations);
     this.nodes = nodesOf(gltf);
+    this.owners = ownersOf(this.nodes); // node index by mesh
     this.mixer = new AnimationMixer(this.root);
     this.action = null;
   }
@@ -39,6 +41,8 @@ export class Side {
     if (this.action) {
       this.action.time = Math.min(time, this.clip.duration);
       this.mixer.update(0);
+      // Ends of cubic splines, which three.js takes as stored
+      for (const node of this.nodes.values()) node.object.quaternion.normalize();
     }
     this.root.updateMatrixWorld(true);
     for (const mesh of this.meshes) mesh.skeleton?.update();
@@ -77,9 +81,40 @@ function nodesOf(gltf) {
   const joints = new Set((gltf.parser.json.skins ?? []).flatMap((skin) => skin.joints));
   for (const node of nodes.values()) {
     node.isJoint = joints.has(node.index);
-    node.rest = { quaternion: node.object.quaternion.clone() };
+    node.rest = { quaternion: node.object.quaternion.normalize().clone() };
   }
   return nodes;
+}
+
+/**
+ * Divide keys of rotations by their length, as glTF means them and `diff` measures them. three.js plays them as stored:
+ * quantized ones then scale what is below by some 1e-4, which adds up along the skeleton.
+ */
+function normalizeRotations(track) {
+  if (!track.name.endsWith(".quaternion") || isCubic(track)) return;
+  track.stored = track.values;
+  track.values = track.values.slice();
+  for (let k = 0; k < track.values.length; k += 4) {
+    const length = Math.hypot(...track.values.subarray(k, k + 4)) || 1;
+    for (let c = k; c < k + 4; c++) track.values[c] /= length;
+  }
+}
+
+export function isCubic(track) {
+  return Boolean(track.createInterpolant.isInterpolantFactoryMethodGLTFCubicSpline);
+}
+
+function ownersOf(nodes) {
+  const indices = new Map([...nodes.values()].map((node) => [node.object, node.index]));
+  const owners = new Map();
+  for (const { object, index } of nodes.values()) {
+    const visit = (each) => {
+      if (each.isMesh) owners.set(each, index);
+      for (const child of each.children) if (!indices.has(child)) visit(child);
+    };
+    visit(object);
+  }
+  return owners;
 }
 
 /** Tracks of a clip by node index. three.js names tracks by the object: of a node, or of one of its meshes. */
