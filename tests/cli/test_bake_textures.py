@@ -91,6 +91,17 @@ def test_godot_reads_two_sets(call: Call, source: Path) -> None:
     assert "does not apply" in refusal(call("convert-cache", source.with_name("a.exr"), "-", "--onto", source), 2)
 
 
+def test_unity_surely_reads_two_sets(call: Call, source: Path) -> None:
+    bake = ("bake", source, source.with_name("a.png"), "--clip", "bend", "--preset", "unity")
+    words = "note: the look-up is in set 2 (from 0 on)"
+    assert words in call(*bake).err
+    document = opened_path(source)
+    for primitive in document.json["meshes"][0]["primitives"]:
+        del primitive["attributes"]["TEXCOORD_1"]
+    source.write_bytes(glb_of(document))
+    assert words not in call(*bake).err
+
+
 def test_obj_files_keep_texture_coordinates_and_materials(call: Call, source: Path) -> None:
     document = opened_path(source)
     assert call("bake", source, source.with_name("a.obj"), "--clip", "bend", "--rigid").code == 0

@@ -118,7 +118,13 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
     _write_mesh(cache, still, grid, engine, outputs, about.mesh, writing.source)
     with outputs.create(f"{outputs.main}.json") as file:
         file.write(metadata.text(about, engine))
-    return WriteResult(worst / engine.per_meter, (*engine.advice, *statistics.notes(cache.times)))
+    advice = engine.advice
+    if uv_set >= engine.sure_sets:
+        advice += (
+            f"the look-up is in set {uv_set} (from 0 on) of the texture coordinates, but the importer of "
+            f"{writing.preset} supports only {engine.sure_sets} completely: test it, or remove a set from the source",
+        )
+    return WriteResult(worst / engine.per_meter, (*advice, *statistics.notes(cache.times)))
 
 
 def _grid(cache: VertexCache) -> TextureLayout:
