@@ -7,10 +7,6 @@ from types import MappingProxyType
 
 from anim.check.checked_file import CheckedFile
 from anim.gltf.document import json_array
-from anim.measure.compare.name_matching import match_by_name_then_order
-from anim.measure.continuous_bound.largest_error import largest_error
-from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import ErrorMetric
 
 ERROR = "error"  # in m, against a source
 
@@ -54,6 +50,11 @@ def error_against(source: CheckedFile, file: CheckedFile) -> float:
 
     Clips are matched by name, else by order, as by `diff`.
     """
+    from anim.measure.compare.name_matching import match_by_name_then_order  # imports most of `measure`
+    from anim.measure.continuous_bound.largest_error import largest_error
+    from anim.measure.continuous_bound.prover import Prover
+    from anim.measure.error.metric import ErrorMetric
+
     old, new = list(source.contents.clips.values()), list(file.contents.clips.values())
     partners = match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     if (partners < 0).any():

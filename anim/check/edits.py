@@ -12,7 +12,6 @@ import numpy as np
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence
 from anim.gltf.document import Document
-from anim.gltf.writing import writer
 from anim.maths import quaternion
 from anim.measure.inspect.track_statistics import stats
 from anim.model import Clip, Interpolation, Track
@@ -25,6 +24,8 @@ ROUNDING = 1e-4  # fraction of an angle between keys, by which it may grow when 
 
 def replace_clips(file: CheckedFile, clips: Mapping[int, Clip]) -> Document:
     """Return the document with these clips, by index; the same one if none of them has another track."""
+    from anim.gltf.writing import writer  # only fixes write
+
     changed = {}
     for number, new in clips.items():
         old = file.contents.clips[number]

@@ -20,12 +20,9 @@ from anim.operations.selection import Selection
 from cli import errors, tables
 from cli.errors import CheckError, UsageError
 from cli.io import documents, input_files
-from cli.io.page_files import open_page_file
-from cli.io.page_output import check_page, write_page
 from cli.options import common
 from cli.reports import inspect_report, json_report
 from cli.reports.inspect_report import Inspected, Smoothness
-from cli.reports.page_panels import report_panels
 from cli.text import Reporter
 from cli.workflows import checked_files
 
@@ -78,6 +75,8 @@ def command(
     refused: list[AnimError] = []
     paths = input_files.expand(inputs or [documents.PIPE])
     if html is not None:
+        from cli.io.page_output import check_page
+
         check_page(html, "--html")
         if len(paths) > 1 or paths[0] == documents.PIPE:
             raise UsageError("--html is about one file with a name")
@@ -101,11 +100,18 @@ def command(
             documents.write_text(("\n" if i else "") + page)
     worst = max(map(errors.report_error, refused), default=errors.DONE)
     if html is not None and worst == errors.DONE:
-        voice = Reporter(quiet)
-        write_page(html, open_page_file(paths[0], voice), None, voice, panels=report_panels(done[0]))
+        _write_page(html, paths[0], done[0], Reporter(quiet))
     if fail_on is not None:
         _check(done, fail_on)
     return worst
+
+
+def _write_page(html: str, path: str, inspected: Inspected, voice: Reporter) -> None:
+    from cli.io.page_files import open_page_file  # imports all readers of caches and curves
+    from cli.io.page_output import write_page
+    from cli.reports.page_panels import report_panels
+
+    write_page(html, open_page_file(path, voice), None, voice, panels=report_panels(inspected))
 
 
 def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, continuity: bool) -> str:

@@ -11,6 +11,7 @@ import typer
 from anim.errors import AnimError
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
+from anim.measure.equal_clips import first_equal, repeat_change, tracks_digest
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loop, best_ranges
 from anim.measure.loops.recommendations import recommend
@@ -83,7 +84,16 @@ def command(
         raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
     many_files.refuse_folder(input, help='a recipe closes loops of many files: steps = ["loop"], then gltf-anim run')
     closing_of = _Closing(blend, input)
-    edit_clips(input, output or documents.PIPE, selection, closing_of, voice, dry_run=dry_run, notes=closing_of.notes)
+    edit_clips(
+        input,
+        output or documents.PIPE,
+        selection,
+        closing_of,
+        voice,
+        dry_run=dry_run,
+        notes=closing_of.notes,
+        by_name=True,
+    )
 
 
 class _Closing:
@@ -96,6 +106,9 @@ class _Closing:
         self._blend = blend
         self._path = "stdin" if path == documents.PIPE else path
         self._skin: SkinMotion | None = None
+        self._done: dict[
+            bytes, tuple[Clip, Clip | UsageError]
+        ] = {}  # of clips with equal tracks the first, and its result
         self._problems: list[str] = []
         self._poses: list[str] = []
 
@@ -105,11 +118,17 @@ class _Closing:
             self._poses.append(name)
             return clip
         self._skin = self._skin or SkinMotion(scene())
-        try:
-            return _closed(clip, tracks, self._skin, self._blend)
-        except UsageError as error:
-            self._problems.append(f"{name} {error}")
+        key = tracks_digest(clip)
+        if key not in self._done:
+            try:
+                self._done[key] = clip, _closed(clip, tracks, self._skin, self._blend)
+            except UsageError as error:
+                self._done[key] = clip, error
+        old, new = self._done[key]
+        if isinstance(new, UsageError):
+            self._problems.append(f"{name} {new}")
             return clip
+        return repeat_change(clip, old, new)
 
     def notes(self, before: Mapping[int, Clip], after: Mapping[int, Clip]) -> Iterator[str]:
         """Yield notes on unchanged clips. Raises UsageError that names every clip that can't be closed."""
@@ -141,17 +160,13 @@ def _report(
         chosen = selection.chosen_clips(reader.names(source.document))
         skin = _skin(source, voice)
         rows: list[tuple[str, Loop]] = []
-        judged: list[tuple[int, Loop]] = []
-        parts: list[tuple[int, list[Loop]]] = []
-        for i in chosen:
-            root = root_motion_node(skin.skeleton, clips[i])
-            name = reader.clip_name(clips[i].name, i)
-            if find:
-                parts.append((i, best_ranges(skin, clips[i], root=root, shortest=shortest or 0.0)))
-                rows += [(name, each) for each in parts[-1][1]]
-            else:
-                judged.append((i, analyze_loop(skin, clips[i], root=root)))
-                rows.append((name, judged[-1][1]))
+        first = first_equal([(clips[i],) for i in chosen])
+        loops: list[list[Loop]] = []
+        for n, i in enumerate(chosen):
+            loops.append(loops[first[n]] if first[n] < n else _loops(skin, clips[i], find=find, shortest=shortest))
+            rows += [(reader.clip_name(clips[i].name, i), each) for each in loops[-1]]
+    parts = list(zip(chosen, loops, strict=True)) if find else []
+    judged = [] if find else [(i, each) for i, (each,) in zip(chosen, loops, strict=True)]
     advised, notes = list(recommend(judged)), list(_no_better(clips, parts)) if clips else ["no clips"]
     if format is Format.JSON:
         documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
@@ -160,6 +175,14 @@ def _report(
         documents.write_text(
             "\n".join(filter(None, (_text(rows, on_skin=skin.is_skin) if rows else "", "".join(lines))))
         )
+
+
+def _loops(skin: SkinMotion, clip: Clip, *, find: bool, shortest: float | None) -> list[Loop]:
+    """The analysis of a whole clip, or of its best ranges."""
+    root = root_motion_node(skin.skeleton, clip)
+    if find:
+        return best_ranges(skin, clip, root=root, shortest=shortest or 0.0)
+    return [analyze_loop(skin, clip, root=root)]
 
 
 def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> Iterator[str]:

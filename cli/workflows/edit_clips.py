@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -18,6 +18,7 @@ from anim.gltf.validation.animation_storage import badly_stored
 from anim.gltf.writing import writer
 from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
+from anim.measure.equal_clips import first_equal, repeat_change
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
@@ -60,6 +61,7 @@ def edit_clips(
     measure: bool = True,
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
     advise: Callable[[Clip, int], str] = lambda clip, number: "",
+    by_name: bool = False,
 ) -> None:
     """Change the selected clips of one file and write it; report the result in one line on stderr.
 
@@ -67,6 +69,7 @@ def edit_clips(
     measure: compare the motion of the written file with that of the input, on the surface.
     notes: gets the changed clips, before and after, and returns notes for the user, a line each.
     advise: gets a clip that can't be changed, and its index, and returns the help of the error, or "".
+    by_name: whether `change` gets every clip; else only the first one of those with equal tracks.
     """
     began = time.perf_counter()
     if not dry_run:
@@ -78,8 +81,12 @@ def edit_clips(
         skeleton = reader.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
         scene = cache(lambda: _scene(document, accessors, skeleton))
-        new = {}
-        for i in chosen:
+        first = range(len(chosen)) if by_name else first_equal([(clips[i],) for i in chosen])
+        new: dict[int, Clip] = {}
+        for i, n in zip(chosen, first, strict=True):
+            if chosen[n] in new:
+                new[i] = repeat_change(clips[i], clips[chosen[n]], new[chosen[n]])
+                continue
             try:
                 new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), scene)
             except AnimError as error:
@@ -143,10 +150,14 @@ def _measured(
         scene, at_nodes = Scene(skeleton, ()), True
     prover = Prover(ErrorMetric(scene))
     measured: list[Proof] = []
-    _warn_of_non_unit_keys(edited, voice)
+    first = first_equal([(before, edited.after[i]) for i, before in edited.before.items()])
+    _warn_of_non_unit_keys(edited, first, voice)
     floor = 0.0
-    for i, before in edited.before.items():
-        found = largest_error(prover, before, edited.after[i], floor=0.0 if voice.verbose else floor)
+    for n, (i, before) in enumerate(edited.before.items()):
+        if first[n] < n:
+            found = measured[first[n]]
+        else:
+            found = largest_error(prover, before, edited.after[i], floor=0.0 if voice.verbose else floor)
         floor = max(floor, found.error.max_error)
         measured.append(found)
         counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
@@ -163,15 +174,23 @@ def _worst(measured: list[Proof]) -> Proof | None:
     return replace(worst, bound=max(bounds) if len(bounds) == len(measured) else None)
 
 
-def _warn_of_non_unit_keys(edited: EditResult, voice: text.Reporter) -> None:
-    """Warn of rotations of changed tracks that are not unit quaternions: the error holds for players that normalize."""
-    counts = []
-    for i, before in edited.before.items():
-        new = {track.target: track for track in edited.after[i].tracks}
-        keys = zip(non_unit_keys(before.tracks), before.tracks, strict=True)
-        counts.append((before.name, i, sum(count for count, track in keys if count and new.get(track.target) != track)))
+def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], voice: text.Reporter) -> None:
+    """Warn of rotations of changed tracks that are not unit quaternions: the error holds for players that normalize.
+
+    first: for each clip the first one that is equal before and after.
+    """
+    counts: list[tuple[str, int, int]] = []
+    for n, (i, before) in enumerate(edited.before.items()):
+        count = counts[first[n]][2] if first[n] < n else _changed_non_unit_keys(before, edited.after[i])
+        counts.append((before.name, i, count))
     if words := describe_non_unit_keys(counts):
         voice.warn(f"{words}; in players that don't normalize rotations the error may be larger than stated")
+
+
+def _changed_non_unit_keys(before: Clip, after: Clip) -> int:
+    new = {track.target: track for track in after.tracks}
+    keys = zip(non_unit_keys(before.tracks), before.tracks, strict=True)
+    return sum(count for count, track in keys if count and new.get(track.target) != track)
 
 
 def _summary(name: str, before: int, after: int, edited: EditResult, seconds: float, *, dry_run: bool) -> str:

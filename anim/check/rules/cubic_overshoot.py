@@ -13,7 +13,6 @@ from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
 from anim.gltf.document import Document
 from anim.maths import hermite
 from anim.model import Clip, Interpolation, Track
-from anim.operations.spline import spline
 
 SAMPLES = np.linspace(0, 1, 17)[1:-1, None, None]  # of a segment: a cubic's extremum is flat, so this is close
 
@@ -47,6 +46,8 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _within_range(clip: Clip, excess: float) -> Clip:
+    from anim.operations.spline import spline  # only fixes import operations
+
     tracks = frozenset(i for i, track in enumerate(clip.tracks) if overshoot(track) > excess)
     return spline(clip, tangents="monotone", tracks=tracks)
 

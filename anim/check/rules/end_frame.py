@@ -16,8 +16,6 @@ from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.end_frames import EndFrame, EndFrameKind, find_end_frames
 from anim.model import Clip
-from anim.operations.loop import append_first_frame
-from anim.operations.trim import trim
 
 MAX_DEVIATION_FRAMES = 0.1  # of a key from the frame that it represents
 PROBLEMS = {
@@ -56,6 +54,9 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _corrected(clip: Clip, frame: EndFrame, file: CheckedFile) -> Clip:
+    from anim.operations.loop import append_first_frame  # only fixes import operations
+    from anim.operations.trim import trim
+
     if frame.kind is EndFrameKind.DUPLICATE:
         return trim(clip, end=frame_before(clip, frame))
     return append_first_frame(clip, fps=1 / frame.duration, root=root_motion_node(file.skeleton, clip))

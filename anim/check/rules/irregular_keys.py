@@ -12,7 +12,6 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
 from anim.model import Clip
-from anim.operations.resample import resample
 
 FPS = 30.0  # of a fixed clip
 MIN_FRAMES = 5  # of a clip that may end between two frames
@@ -36,6 +35,8 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _on_grid(clip: Clip, file: CheckedFile) -> Clip:
+    from anim.operations.resample import resample  # only fixes import operations
+
     frames = (clip.end - clip.start) * FPS
     fps = FPS if frames > MIN_FRAMES else max(round(frames), 1) / (clip.end - clip.start)
     return resample(single_keys(clip, file), fps=fps, snap=True)

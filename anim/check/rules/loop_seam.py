@@ -14,9 +14,7 @@ from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
 from anim.measure.inspect.frame_rate import GRID_TOLERANCE_FRAMES, estimate_frame_rate, usual_frame_rate
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.loop_analysis import analyze_loop
 from anim.model import Clip
-from anim.operations.close_loop import close_loop
 from anim.units import format_number
 
 LOOP_NAME = re.compile(r"(^|[^a-z])(loop|cycle|idle)([^a-z]|$)", re.IGNORECASE)
@@ -46,6 +44,9 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _close(clip: Clip, file: CheckedFile) -> Clip:
+    from anim.measure.loops.loop_analysis import analyze_loop  # only fixes import analyses and operations
+    from anim.operations.close_loop import close_loop
+
     root = root_motion_node(file.skeleton, clip)
     fps = _frame_rate(clip)
     blend = min(BLEND_S, clip.end - clip.start) if fps is None else _whole_frames(clip, fps)

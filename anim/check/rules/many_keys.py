@@ -11,7 +11,6 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
 from anim.model import Clip, TimeAxis
-from anim.operations.resample import resample
 
 MIN_KEYS = 10  # of a track, for a rate
 FPS = 60.0  # of a fixed track
@@ -42,6 +41,8 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _slow_down(clip: Clip, limit: float) -> Clip:
+    from anim.operations.resample import resample  # only fixes import operations
+
     duration = clip.end - clip.start
     fps = max(math.floor(duration * min(FPS, limit) + 1e-6), 1) / duration
     tracks = frozenset(i for i, track in enumerate(clip.tracks) if _rate(track.time_axis) > limit)

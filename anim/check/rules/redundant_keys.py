@@ -10,7 +10,6 @@ from anim.check.edits import replace_clips, single_keys
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule, counted
 from anim.gltf.document import Document
-from anim.optimization.tracks.needed_keys import needed_keys
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -22,6 +21,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document without these keys. All clips are looked at together, as they share time axes."""
+    from anim.optimization.tracks.needed_keys import needed_keys  # only fixes import optimizations
+
     clips = {i: single_keys(clip, file) for i, clip in file.contents.clips.items()}
     needed = iter(needed_keys([track for clip in clips.values() for track in clip.tracks], file.skeleton))
     new = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from anim.arrays import Ints
 from anim.measure.compare import name_matching
 from anim.measure.compare.correspondence import Correspondence
 from anim.measure.continuous_bound.prover import Prover
+from anim.measure.equal_clips import first_equal
 from anim.measure.error.metric import FPS, ErrorMetric, MotionError, dense_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Scene
@@ -90,12 +91,8 @@ def diff(
     """
     partners = name_matching.match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     wanted = range(len(old)) if chosen is None else chosen
-    prover = Prover(ruler)
-    found = [
-        _compare_clips(prover, (i, old[i]), (int(partners[i]), new[partners[i]]), player=player, fps=fps)
-        for i in wanted
-        if partners[i] >= 0
-    ]
+    pairs = [(i, int(partners[i])) for i in wanted if partners[i] >= 0]
+    found = _compare_pairs(Prover(ruler), old, new, pairs, player=player, fps=fps)
     found.sort(key=lambda each: -each.error.max_error)
     taken = set(partners.tolist())
     nodes = ruler.pairs.nodes
@@ -149,6 +146,26 @@ def _listed(names: Sequence[str]) -> str:
         return f"mesh '{names[0]}' has"
     more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
     return "meshes " + ", ".join(f"'{name}'" for name in names[:MAX_LISTED]) + f"{more} have"
+
+
+def _compare_pairs(
+    prover: Prover,
+    old: Sequence[Clip],
+    new: Sequence[Clip],
+    pairs: Sequence[tuple[int, int]],
+    *,
+    player: str,
+    fps: float,
+) -> list[ClipDiff]:
+    """The differences of clips by index. Pairs with equal tracks are measured once."""
+    first = first_equal([(old[i], new[j]) for i, j in pairs])
+    found: list[ClipDiff] = []
+    for n, (i, j) in enumerate(pairs):
+        if first[n] < n:
+            found.append(replace(found[first[n]], old=i, new=j, name=old[i].name, new_name=new[j].name))
+        else:
+            found.append(_compare_clips(prover, (i, old[i]), (j, new[j]), player=player, fps=fps))
+    return found
 
 
 def _compare_clips(

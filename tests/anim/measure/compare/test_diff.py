@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anim.arrays import Floats
+from anim.measure.compare import diff as compare
 from anim.measure.compare.diff import diff
-from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.model import Clip, Scene
 from anim.operations.resample import resample
 from tests.clips import about, clip, skeleton, track
@@ -28,6 +30,27 @@ def test_the_worst_clip_comes_first() -> None:
     assert [each.error.max_error for each in found.clips] == pytest.approx([0.5, 0.25, 0], rel=1e-3)
     assert found.clips[0].statistics.speed.size == pytest.approx(0.5, rel=0.02)
     assert found.diagonal == 1
+
+
+def test_equal_clips_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured: list[str] = []
+
+    def seen(*clips: Clip, fps: float) -> Floats:
+        measured.append(clips[0].name)
+        return dense_times(*clips, fps=fps)
+
+    monkeypatch.setattr(compare, "dense_times", seen)
+    old = [_moved(name, 1) for name in "abcd"]
+    new = [_moved("a", 1.5), _moved("b", 1.5), _moved("c", 1.25), _moved("d", 1.5)]
+    found = diff(ErrorMetric(SCENE), old, new)
+    assert [(each.name, each.new_name, each.old, each.new) for each in found.clips] == [
+        ("a", "a", 0, 0),
+        ("b", "b", 1, 1),
+        ("d", "d", 3, 3),
+        ("c", "c", 2, 2),
+    ]
+    assert [each.error.max_error for each in found.clips] == pytest.approx([0.5, 0.5, 0.5, 0.25], rel=1e-3)
+    assert measured == ["a", "c"]
 
 
 def test_clips_that_only_one_has() -> None:
