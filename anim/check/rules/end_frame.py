@@ -13,6 +13,7 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
+from anim.measure.equal_clips import first_equal
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.end_frames import EndFrame, EndFrameKind, find_end_frames
 from anim.model import Clip
@@ -37,11 +38,13 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 
 def _end_frames(file: CheckedFile) -> Iterator[tuple[int, Clip, EndFrame]]:
-    clips = {report.index: clip for report, clip in file.clips()}
-    roots = [root_motion_node(file.skeleton, clip) for clip in clips.values()]
-    frames = find_end_frames(file.motion, list(clips.values()), roots)
-    for (number, clip), frame in zip(clips.items(), frames, strict=True):
-        if frame is not None:
+    clips = [(report.index, clip) for report, clip in file.clips()]
+    first = first_equal([(clip,) for _, clip in clips])
+    distinct = {n: clip for n, (_, clip) in enumerate(clips) if first[n] == n}
+    roots = [root_motion_node(file.skeleton, clip) for clip in distinct.values()]
+    frames = dict(zip(distinct, find_end_frames(file.motion, list(distinct.values()), roots), strict=True))
+    for n, (number, clip) in enumerate(clips):
+        if (frame := frames[first[n]]) is not None:
             yield number, clip, frame
 
 

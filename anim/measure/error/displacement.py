@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -76,6 +76,15 @@ class SkinnedDisplacement:
         chosen = self._moved[self._groups.reach[group]][:, frames].transpose(0, 3, 2, 1)  # (J_g, 4, 3, f)
         flat = self._groups.products[group] @ chosen.reshape(-1, 3 * len(frames))
         return np.asarray(flat.reshape(-1, 3, len(frames)))
+
+    def uniform_vectors(self, frames: Ints) -> Floats | None:
+        """Return the vectors (G, V_g, 3, f) of all groups, None if they differ in numbers of vertices or joints."""
+        products = self._groups.products
+        if len(products) < 2 or len({each.shape for each in products}) > 1:
+            return None
+        chosen = self._moved[np.stack(self._groups.reach)][:, :, frames].transpose(0, 1, 4, 3, 2)  # (G, J_g, 4, 3, f)
+        flat = np.stack(products) @ chosen.reshape(len(products), -1, 3 * len(frames))
+        return np.asarray(flat.reshape(*flat.shape[:2], 3, len(frames)))
 
     def joint(self, group: int, frame: int, vertex: int) -> int:
         """Return the joint of the surface that moves a vertex (−1: any) of a group most in a frame."""
@@ -183,6 +192,16 @@ def lengths(field: DisplacementField, group: int, frames: Ints) -> Floats:
     return np.asarray(np.sqrt(vectors.sum(axis=1)))
 
 
+def lengths_by_group(field: DisplacementField, groups: int, frames: Ints) -> Iterator[Floats]:
+    """Yield the lengths of the vectors of all groups in some frames, in the order of groups, vertices, frames: flat."""
+    if isinstance(field, SkinnedDisplacement) and (found := field.uniform_vectors(frames)) is not None:
+        found *= found
+        yield np.sqrt(found.sum(axis=2)).reshape(-1)
+        return
+    for group in range(groups):
+        yield lengths(field, group, frames).reshape(-1)
+
+
 def max_displacement(field: DisplacementField, *, floor: float, slack: float, most: int) -> MaxDisplacement:
     """Return the longest vector: a bound that is at most `slack` times or `floor` above its length.
 
@@ -194,6 +213,9 @@ def max_displacement(field: DisplacementField, *, floor: float, slack: float, mo
     found = MaxDisplacement(0.0, group, int(field.limits[group].argmax()), -1, field.limits.copy())
     left = 0.0  # the largest bound of groups that were not evaluated
     for group in np.argsort(-tops, kind="stable").tolist():
+        if tops[group] <= max(found.length * slack, floor) or most <= 0:
+            left = max(left, float(tops[group]))  # those of the groups that follow are no larger
+            break
         limits = field.limits[group]
         waiting = np.argsort(-limits, kind="stable")
         size = FIRST

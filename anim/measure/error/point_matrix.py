@@ -124,8 +124,14 @@ def all_points(scene: Scene, radius: float) -> PointMatrix:
 
 
 def _shells(scene: Scene, nodes: Set[int], radius: float) -> list[tuple[Ints, Floats]]:
+    """Nodes (P, 1) and factors (P, 1, 4) of all points around some nodes, as one part."""
+    if not nodes:
+        return []
     around = np.array(sorted(nodes), np.int64)
-    return [_shell(node, ends) for node, ends in zip(around, shells_of(scene.skeleton, around, radius), strict=True)]
+    ends = shells_of(scene.skeleton, around, radius)
+    factors = np.ones((ends.shape[0] * ends.shape[1], 1, 4))
+    factors[:, 0, :3] = ends.reshape(-1, 3)
+    return [(np.repeat(around, ends.shape[1])[:, None], factors)]
 
 
 def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
@@ -162,9 +168,3 @@ def _of_surface(surface: Surface, vertices: Ints) -> tuple[Ints, Floats]:
     factors = np.ones((*joints.shape, 4))
     factors[..., :3] = np.einsum("viab,vb->via", bind[..., :3], points) + bind[..., 3]
     return surface.nodes[joints], factors * weights[..., None]
-
-
-def _shell(node: int, ends: Floats) -> tuple[Ints, Floats]:
-    factors = np.ones((len(ends), 1, 4))
-    factors[:, 0, :3] = ends
-    return np.full((len(ends), 1), node, np.int64), factors

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.displacement import lengths, max_displacement
+from anim.measure.error.displacement import lengths_by_group, max_displacement
 from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, ErrorMetric, dense_times
 from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
@@ -111,8 +111,7 @@ def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
     for part in surfaces or ruler.parts:
         field = part.field(block.old, block.new)
         if field is not None:
-            for group in range(len(part.groups)):
-                yield lengths(field, group, frames).reshape(-1)
+            yield from lengths_by_group(field, len(part.groups), frames)
 
 
 def _percentile(values: Floats, share: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from anim.arrays import Bools
 from anim.gltf.document import Document, json_array
+from anim.measure.equal_clips import first_equal
 from anim.measure.inspect import frame_rate, root_motion, storage_cost
 from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
@@ -31,7 +32,8 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
     document, skeleton, scene, clips = contents.document, contents.skeleton, contents.scene, contents.clips
     json = document.json
     numbers = [i for i in (clips if chosen is None else chosen) if i in clips]
-    looked_at = [clips[i] for i in numbers]
+    first = first_equal([(clips[i],) for i in numbers])
+    looked_at = [clips[i] for n, i in enumerate(numbers) if first[n] == n]  # equal clips are measured once
     groups = concatenate([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
@@ -42,22 +44,14 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
     costs, cost = storage_cost.storage_costs(document)
     stored_bytes = min(stored(document), cost.data)
     packed = stored_bytes / cost.data if cost.data else 1.0
-    clip_facts = tuple(
-        _clip(
-            i,
-            clip,
-            ways[n],
-            seams[n],
-            measured_on,
-            skeleton,
-            counted[ends[n] : ends[n + 1]],
-            costs[i],
-            packed,
-            contents.file_bytes,
-            tracks=tracks,
-        )
-        for n, (i, clip) in enumerate(zip(numbers, looked_at, strict=True))
+    measured = (
+        _clip(clip, ways[n], seams[n], measured_on, skeleton, counted[ends[n] : ends[n + 1]], tracks=tracks)
+        for n, clip in enumerate(looked_at)
     )
+    reports: list[ClipReport] = []
+    for n, i in enumerate(numbers):
+        report = next(measured) if first[n] == n else reports[first[n]]
+        reports.append(_with_costs(report, i, clips[i].name, costs[i], packed, contents.file_bytes))
     skins = range(len(json_array(json, "skins")))
     return Facts(
         str(json["asset"].get("generator", "")),
@@ -68,7 +62,7 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
         cost.data,
         stored_bytes,
         cost.json,
-        clip_facts,
+        tuple(reports),
         tuple(_skin(i, document, scene) for i in skins if i not in contents.lost_skins),
         contents.faults,
         contents.unreadable_clips,
@@ -82,26 +76,38 @@ def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]
     return measure_seams(skin, parts, groups)
 
 
+def _with_costs(
+    report: ClipReport, number: int, name: str, cost: storage_cost.StorageCost, packed: float, file_bytes: int
+) -> ClipReport:
+    """The report of a clip with equal tracks under its own index and name, with its own bytes."""
+    stored_bytes = round(packed * cost.data)
+    return replace(
+        report,
+        index=number,
+        name=name,
+        data_bytes=cost.data,
+        stored_bytes=stored_bytes,
+        json_bytes=cost.json,
+        share=(stored_bytes + cost.json) / file_bytes if file_bytes else 0.0,
+    )
+
+
 def _clip(
-    number: int,
     clip: Clip,
     way: root_motion.RootMotion,
     seam: Seam,
     measured_on: str,
     skeleton: Skeleton,
     counted: TrackStats,
-    cost: storage_cost.StorageCost,
-    packed: float,
-    file_bytes: int,
     *,
     tracks: bool,
 ) -> ClipReport:
+    """The report of a clip, without index and bytes."""
     start, end = clip.start, clip.end
     counted = _with_end(clip, counted)
-    stored_bytes = round(packed * cost.data)
     estimated = frame_rate.estimate_frame_rate(clip.key_times)
     return ClipReport(
-        index=number,
+        index=0,
         name=clip.name,
         start_s=start,
         end_s=end,
@@ -111,10 +117,10 @@ def _clip(
         keys=sum(len(track.times) for track in clip.tracks),
         frame_rate_fps=estimated.fps if estimated else None,
         frame_rate_regular=estimated.regular if estimated else None,
-        data_bytes=cost.data,
-        stored_bytes=stored_bytes,
-        json_bytes=cost.json,
-        share=(stored_bytes + cost.json) / file_bytes if file_bytes else 0.0,
+        data_bytes=0,
+        stored_bytes=0,
+        json_bytes=0,
+        share=0.0,
         constant_tracks=int(counted.constant.sum()),
         no_effect_tracks=int(counted.no_effect.sum()),
         repeating_tracks=_repeating(clip, counted),
