@@ -9,12 +9,10 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.error.surface import Surface
+from anim.measure.loops.carried_distance import carried_distances
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Pose
 from anim.sampling.pose import sample_pose
-from anim.sampling.world import world_by_node
-
-PARTS = ("translation", "rotation", "scale")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +38,7 @@ def joint_gaps(skin: SkinMotion, clip: Clip, start: float, end: float, root: int
     nodes = _moved_between(both, root)
     rows = [
         JointGap(skin.skeleton.display_name(node), node, gap)
-        for node, gap in zip(nodes.tolist(), _carried(skin, both, nodes, root).tolist(), strict=True)
+        for node, gap in zip(nodes.tolist(), carried_distances(skin, both, nodes, root).tolist(), strict=True)
     ]
     for node, weights in both.weights.items():
         change = _morphed(skin, node, weights[1] - weights[0])
@@ -73,24 +71,6 @@ def _moved_between(both: Pose, root: int) -> Ints:
     if root >= 0:
         shifted[root] = False
     return np.flatnonzero(differs | shifted)
-
-
-def _carried(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> Floats:
-    """Largest distance (K,) that a point moves if one of the nodes (K,), alone, ends as it starts."""
-    frame = np.arange(len(nodes))
-    parts = {name: np.repeat(getattr(both, name)[1:], len(nodes), axis=0) for name in PARTS}
-    for name, values in parts.items():
-        values[frame, nodes] = getattr(both, name)[0, nodes]
-    if root >= 0:
-        parts["translation"][:, root] = both.translation[1, root]
-    last = Pose(both.times[1:], both.translation[1:], both.rotation[1:], both.scale[1:])
-    times = np.repeat(both.times[1:], len(nodes))
-    changed = Pose(times, parts["translation"], parts["rotation"], parts["scale"])
-    differences = np.subtract(*(world_by_node(skin.skeleton, each) for each in (changed, last)))
-    count = skin.batch_size(1)
-    stretches = (differences[:, first : first + count] for first in range(0, len(nodes), count))
-    squares = [skin.squares(each).max(axis=0, initial=0.0) for each in stretches if len(skin.vertices)]
-    return np.sqrt(np.concatenate(squares)) if squares else np.zeros(len(nodes))
 
 
 def _morphed(skin: SkinMotion, node: int, change: Floats) -> float:
