@@ -1,4 +1,8 @@
-"""Affine matrices (..., 3, 4) for column vectors: the last row 0 0 0 1 is left out."""
+"""Affine matrices (..., 3, 4) for column vectors: the last row 0 0 0 1 is left out.
+
+Matrices over time (..., F, 3, 4) come as views of (..., 4, 3, F): every component is contiguous over F frames, which
+makes sums and products twice as fast.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +17,13 @@ ORTHOGONALITY_TOLERANCE = 1e-9  # cosine between axes that counts as 0
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
     """Return T·R·S (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4), scale (..., 3)."""
-    x, y, z, w = np.moveaxis(rotation, -1, 0)
+    x, y, z, w = np.ascontiguousarray(np.moveaxis(rotation, -1, 0))
     sx, sy, sz = np.ascontiguousarray(np.moveaxis(scale, -1, 0))
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz = x * x2, y * y2, z * z2
     xy, xz, yz = x * y2, x * z2, y * z2
     wx, wy, wz = w * x2, w * y2, w * z2
-    result: Floats = np.empty((*rotation.shape[:-1], 3, 4))
+    result = _by_component(rotation.shape[:-1])
     np.multiply(1 - (yy + zz), sx, out=result[..., 0, 0])
     np.multiply(xy - wz, sy, out=result[..., 0, 1])
     np.multiply(xz + wy, sz, out=result[..., 0, 2])
@@ -91,15 +95,30 @@ def accumulate_world(local: Floats, parents: Ints, levels: list[Ints]) -> Floats
 
     parents: (N,), −1 for roots. levels: node indices by depth, roots first.
     """
-    world = np.empty_like(local)
+    columns = np.swapaxes(local, 1, 3)
+    world = np.empty(columns.shape)
     for depth, nodes in enumerate(levels):
-        if depth and len(nodes) == 1:  # in a chain: without copies
-            node, above = int(nodes[0]), world[parents[nodes[0]]]
-            np.matmul(above[..., :3], local[node], out=world[node])
-            world[node, ..., 3] += above[..., 3]
+        own = columns[_index(nodes)]
+        if depth == 0:
+            world[_index(nodes)] = own
             continue
-        world[nodes] = local[nodes] if depth == 0 else multiply(world[parents[nodes]], local[nodes])
-    return world
+        above = world[_index(parents[nodes])]
+        product = np.einsum("njif,nkjf->nkif", above[:, :3], own)
+        product[:, 3] += above[:, 3]
+        world[_index(nodes)] = product
+    return np.swapaxes(world, 1, 3)
+
+
+def _index(nodes: Ints) -> Ints | slice:
+    """The nodes as an index; a single one as a slice, which copies nothing."""
+    return nodes if len(nodes) != 1 else slice(int(nodes[0]), int(nodes[0]) + 1)
+
+
+def _by_component(shape: tuple[int, ...]) -> Floats:
+    """An empty array (*shape, 3, 4), contiguous over the last axis of `shape`."""
+    if not shape:
+        return np.empty((3, 4))
+    return np.swapaxes(np.empty((*shape[:-1], 4, 3, shape[-1])), -1, -3)
 
 
 def _complete_axes(directions: Floats, scale: Floats) -> Floats:

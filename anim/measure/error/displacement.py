@@ -245,9 +245,9 @@ def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:
 def largest_over(points: Floats, moved: Floats) -> Floats:
     """Return the largest displacement (J, F) of points (J, P, 3) by matrix differences (J, F, 3, 4)."""
     whole = np.concatenate((points, np.ones((*points.shape[:-1], 1))), axis=-1)
-    flat = moved.reshape(len(moved), -1, 4) @ np.swapaxes(whole, -1, -2)  # (J, 3 F, P), one product per joint
-    flat *= flat
-    displaced = flat.reshape(*moved.shape[:3], -1)
+    columns = np.swapaxes(moved, 1, 3)  # (J, 4, 3, F)
+    displaced = (whole @ columns.reshape(len(moved), 4, -1)).reshape(*whole.shape[:2], 3, -1)  # one product per joint
+    displaced *= displaced
     squares = displaced[:, :, 0] + displaced[:, :, 1]
     squares += displaced[:, :, 2]
-    return np.asarray(np.sqrt(squares.max(axis=-1)))
+    return np.asarray(np.sqrt(squares.max(axis=1)))

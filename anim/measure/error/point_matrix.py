@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +25,7 @@ ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
 DENSE = 4_000_000  # values; a larger matrix is stored as a sparse one
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PointMatrix:
     """P points on J nodes, each on up to I of them.
 
@@ -40,18 +42,27 @@ class PointMatrix:
 
     def rows(self) -> PointRows:
         """Return the matrix (P, 4 J), float32, from stacked columns of node matrices to positions."""
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> PointRows:
+        return PointRows(self._matrix.astype(np.float32))
+
+    @cached_property
+    def _matrix(self) -> Any:
+        """The same in float64, dense or sparse."""
         width = self.joints.shape[1]
         row = np.repeat(np.arange(len(self)), 4 * width)
         column = (4 * self.joints[..., None] + np.arange(4)).reshape(-1)
         shape = (len(self), 4 * len(self.nodes))
-        values = self.factors.astype(np.float32).reshape(-1)
+        values = self.factors.reshape(-1)
         if shape[0] * shape[1] > DENSE:
             from scipy.sparse import csr_array
 
-            return PointRows(csr_array((values, (row, column)), shape=shape))
-        dense = np.zeros(shape, np.float32)
+            return csr_array((values, (row, column)), shape=shape)
+        dense = np.zeros(shape)
         np.add.at(dense, (row, column), values)
-        return PointRows(dense)
+        return dense
 
     def take(self, chosen: Ints) -> PointMatrix:
         """Return some of the points, by index."""
@@ -67,11 +78,8 @@ class PointMatrix:
 
     def places(self, world: Floats) -> Floats:
         """Return the positions of the points (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
-        matrices = world[self.nodes]
-        places = np.zeros((len(self), world.shape[1], 3))
-        for joint, factor in zip(self.joints.T, np.swapaxes(self.factors, 0, 1), strict=True):
-            places += np.einsum("pfij,pj->pfi", matrices[joint], factor)
-        return places
+        places = self._matrix @ stack_points(world, self.nodes)
+        return np.swapaxes(places.reshape(len(self), 3, -1), 1, 2)
 
     def on(self, below: Bools) -> Bools:
         """Return the mask (P,) of points with a noticeable weight on the nodes `below` (N,).
@@ -85,12 +93,12 @@ class PointMatrix:
 class PointRows:
     """A matrix (P, 4 J), dense or sparse, as a factor of stacked columns."""
 
-    def __init__(self, matrix: object) -> None:
+    def __init__(self, matrix: Any) -> None:
         self._matrix = matrix
 
     def moves(self, columns: Floats) -> Floats:
         """Return displacements (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
-        moved = self._matrix @ columns.astype(np.float32)  # type: ignore[operator]
+        moved = self._matrix @ columns.astype(np.float32)
         return np.asarray(moved).reshape(len(moved), 3, -1)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,8 +17,8 @@ from anim.optimization.options import Reference
 from anim.optimization.search import playback
 from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.tracks.clip_ends import closure_sign
-from anim.sampling import sample_pose, times
-from anim.sampling.track import find_interval
+from anim.sampling import PoseSampler, times
+from anim.sampling.players import sampler
 
 CUBIC_STEP = 1 / 60  # s; sample step of splines, with at least CUBIC_SEGMENTS samples per segment
 CUBIC_SEGMENTS = 8
@@ -90,16 +91,14 @@ def analyze_source(
     tracks = [clip.tracks[i] for i in free]
     grid = key_grid(tracks)
     at = grid if reference is Reference.KEYS else measurement_times(grid, clip.tracks)
-    local = _local(skeleton, clip, at)
+    poses = PoseSampler(skeleton, clip)
+    local = _local(poses, at)
     levels = required_levels(skeleton, points.nodes)
     world = level_world_matrices(skeleton, local, levels)
     nodes = {track.node for track in tracks if track.node is not None}
     reach = _influence_radius(world, points, {node: below[node] for node in nodes})
     widening = _widening(skeleton, world, levels)
-    moving = tuple(
-        _source_track(number, track, skeleton, local, reach, widening, chord_tolerance)
-        for number, track in zip(free, tracks, strict=True)
-    )
+    moving = _source_tracks(clip, free, skeleton, local, reach, widening, chord_tolerance)
     answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
     columns = stack_points(world, points.nodes)
     by_chord = columns
@@ -107,7 +106,7 @@ def analyze_source(
         each.path == "rotation" and each.meters * _max_chord_error(clip.tracks[each.index]) > chord_tolerance
         for each in moving
     ):
-        by_chord = stack_points(level_world_matrices(skeleton, _nlerp_local(clip, at, local), levels), points.nodes)
+        by_chord = stack_points(level_world_matrices(skeleton, _nlerp_local(poses, at, local), levels), points.nodes)
     return SourceMotion(
         grid,
         at,
@@ -143,22 +142,17 @@ def _spline_times(axis: Floats) -> Floats:
     return np.concatenate(inner) if inner else axis
 
 
-def _local(skeleton: Skeleton, clip: Clip, at: Floats) -> tuple[Floats, Floats, Floats]:
-    shown = sample_pose(skeleton, clip, at)
+def _local(poses: PoseSampler, at: Floats) -> tuple[Floats, Floats, Floats]:
+    shown = poses.at(at)
     rotation = quaternion.align_signs(shown.rotation)
     parts = (np.ascontiguousarray(np.swapaxes(part, 0, 1)) for part in (shown.translation, rotation, shown.scale))
     translation, rotation, scale = parts
     return translation, rotation, scale
 
 
-def _nlerp_local(clip: Clip, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+def _nlerp_local(poses: PoseSampler, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
     """The same in players with component-wise interpolation."""
-    rotation = local[1].copy()
-    for track in clip.tracks:
-        if track.path == "rotation" and track.interpolation is Interpolation.LINEAR and track.node is not None:
-            keys = quaternion.normalize(track.values)[:, None]
-            rotation[track.node] = playback.nlerp(keys, find_interval(track.times, at))[:, 0]
-    return local[0], rotation, local[2]
+    return local[0], np.swapaxes(poses.sampled(sampler("nlerp")).at(at).rotation, 0, 1), local[2]
 
 
 def _max_chord_error(track: Track) -> float:
@@ -180,41 +174,57 @@ def _source_keys(track: Track, grid: Floats) -> Bools:
     return found
 
 
-def _source_track(
-    number: int,
-    track: Track,
+def _source_tracks(
+    clip: Clip,
+    free: Sequence[int],
     skeleton: Skeleton,
     local: tuple[Floats, Floats, Floats],
     reach: dict[int, float],
     widening: Floats,
     chord_tolerance: float,
-) -> SourceTrack:
-    node = track.node
-    assert node is not None
-    values = local[PATHS.index(track.path)][node]
-    rest = getattr(skeleton, track.path)[node]
-    middle = (values.min(axis=0) + values.max(axis=0)) / 2
-    if track.path == "rotation":
-        rest = np.where(values[0] @ rest < 0, -rest, rest)
-        middle = quaternion.normalize(middle) if np.abs(middle).max() > 1e-6 else values[0]
-        meters = 2 * reach[node]
-    elif track.path == "translation":
-        meters = widening[node]
-    else:
-        meters = reach[node] / max(float(np.abs(values).min()), 1e-6)
-    from_rest, from_middle = (float(np.linalg.norm(values - each, axis=1).max() * meters) for each in (rest, middle))
-    closure = closure_sign(values, chord_tolerance / meters if meters else 0.0)
-    return SourceTrack(number, node, track.path, values, rest, middle, float(meters), from_rest, from_middle, closure)
+) -> tuple[SourceTrack, ...]:
+    """The tracks with indices in `free`, in that order; those of one path are computed together."""
+    found: dict[int, SourceTrack] = {}
+    for path, every in zip(PATHS, local, strict=True):
+        numbers = [i for i in free if clip.tracks[i].path == path]
+        nodes = [node for i in numbers if (node := clip.tracks[i].node) is not None]
+        values, rest = every[nodes], getattr(skeleton, path)[nodes]  # (G, W, C), (G, C)
+        middle = (values.min(axis=1) + values.max(axis=1)) / 2
+        meters = np.array([reach[node] for node in nodes])
+        if path == "rotation":
+            rest = np.where(quaternion.dot(values[:, 0], rest)[:, None] < 0, -rest, rest)
+            known = np.abs(middle).max(axis=1) > 1e-6
+            middle = np.where(known[:, None], middle, values[:, 0])
+            middle[known] = quaternion.normalize(middle[known])
+            meters = 2 * meters
+        elif path == "translation":
+            meters = widening[nodes]
+        else:
+            meters = meters / np.maximum(np.abs(values).min(axis=(1, 2)), 1e-6)
+        from_rest, from_middle = (np.sqrt(farthest(values, each)) * meters for each in (rest, middle))
+        for k, (number, node) in enumerate(zip(numbers, nodes, strict=True)):
+            unit = float(meters[k])
+            closure = closure_sign(values[k], chord_tolerance / unit if unit else 0.0)
+            errors = float(from_rest[k]), float(from_middle[k])
+            found[number] = SourceTrack(number, node, path, values[k], rest[k], middle[k], unit, *errors, closure)
+    return tuple(found[i] for i in free)
+
+
+def farthest(values: Floats, points: Floats) -> Floats:
+    """Return the largest squared distance (G,) of values (G, W, C) from one point each (G, C)."""
+    apart = values - points[:, None]
+    return np.asarray(np.einsum("gwc,gwc->gw", apart, apart).max(axis=1, initial=0.0))
 
 
 def _influence_radius(world: Floats, points: PointMatrix, answering: dict[int, Bools]) -> dict[int, float]:
     """For each node, the largest distance of the points it moves, in metres."""
     frames = world[:, :: max(1, -(-world.shape[1] // PROBE_FRAMES))]
-    places = points.places(frames)
+    places = np.swapaxes(points.places(frames), 1, 2)  # (P, 3, F)
     found = {}
     for node, mine in answering.items():
-        away = places[mine] - frames[node][None, :, :, 3]
-        found[node] = float(np.sqrt((away * away).sum(axis=-1)).max(initial=0.0))
+        away = places[mine] - frames[node, :, :, 3].T
+        away *= away
+        found[node] = math.sqrt((away[:, 0] + away[:, 1] + away[:, 2]).max(initial=0.0))
     return found
 
 

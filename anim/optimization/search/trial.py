@@ -18,7 +18,7 @@ from anim.optimization.search import playback
 from anim.optimization.search.candidates import Candidate, Candidates
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
 from anim.optimization.search.plan import Plan, RotationTarget, TrackAction, TrialResult
-from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion, SourceTrack
+from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion, farthest
 from anim.optimization.search.time_axes import SharedAxis, TimeAxisSearch
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
@@ -58,7 +58,7 @@ class TrialRunner:
         self._from_rest = np.array([each.from_rest for each in source.moving])
         self._from_middle = np.array([each.from_middle for each in source.moving])
         self._rest = [_rest(source, path) for path in PATHS]
-        self._constants = [_constant_errors(each, values) for each, values in zip(source.moving, shared, strict=True)]
+        self._constants = _constant_errors(source, shared)
         self._layouts = TimeAxisSearch(source, coding, self._bound)
         self._candidates = Candidates(source, coding.packing)
         self._compensation = ParentCompensation(skeleton, source, self._candidates)
@@ -134,10 +134,8 @@ class TrialRunner:
 
     def _constant(self, i: int, allowance: float) -> EncodedKeys:
         """The key of a constant track: the value of other clips, else the rest value, else the middle."""
-        for stored, error in self._constants[i]:
-            if error <= allowance:
-                return stored
-        return self._constants[i][-1][0]
+        value = next((value for value, error in self._constants[i] if error <= allowance), self._constants[i][-1][0])
+        return quantization.constant_cost(value)
 
     def _chords_matter(self, axes: list[SharedAxis], keys: dict[int, EncodedKeys]) -> bool:
         for axis in axes:
@@ -175,17 +173,23 @@ def _rest(source: SourceMotion, path: str) -> Floats:
     return np.array([each.rest if each.path == path else np.zeros(width) for each in source.moving]).reshape(-1, width)
 
 
-def _constant_errors(track: SourceTrack, values: Sequence[Floats]) -> list[tuple[EncodedKeys, float]]:
-    """Each value as a key, with the track's largest distance from it, in metres; then rest and middle."""
-    found = []
-    for value in values:
-        if track.path == "rotation" and track.values[0] @ value < 0:
-            value = -value
-        apart = track.values - value
-        error = math.sqrt(float(np.einsum("wc,wc->w", apart, apart).max())) * track.meters
-        found.append((quantization.constant_cost(value), error))
-    found.append((quantization.constant_cost(track.rest), track.from_rest))
-    return [*found, (quantization.constant_cost(track.middle), track.from_middle)]
+def _constant_errors(source: SourceMotion, shared: Sequence[Sequence[Floats]]) -> list[list[tuple[Floats, float]]]:
+    """For each track the `shared` values with its largest distance from each, in metres; then rest and middle."""
+    found: list[list[tuple[Floats, float]]] = [[] for _ in source.moving]
+    for path in PATHS:
+        pairs = [(i, value) for i, each in enumerate(source.moving) if each.path == path for value in shared[i]]
+        if not pairs:
+            continue
+        tracks = [source.moving[i] for i, _ in pairs]
+        moved, values = np.array([each.values for each in tracks]), np.array([value for _, value in pairs])
+        if path == "rotation":
+            values = np.where(quaternion.dot(moved[:, 0], values)[:, None] < 0, -values, values)
+        errors = np.sqrt(farthest(moved, values)) * np.array([each.meters for each in tracks])
+        for (i, _), value, error in zip(pairs, values, errors.tolist(), strict=True):
+            found[i].append((value, error))
+    for constants, each in zip(found, source.moving, strict=True):
+        constants += [(each.rest, each.from_rest), (each.middle, each.from_middle)]
+    return found
 
 
 class BoundUsage:
