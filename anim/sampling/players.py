@@ -1,6 +1,6 @@
 """Interpolation of LINEAR rotations by different players.
 
-Each player is a row of PLAYERS with its values and, for bounds on derivatives, its arc; a test compares the two.
+Each player is a row of PLAYERS with its arc, from which values and bounds on derivatives follow.
 
 glTF specifies slerp. Quaternions stored as integers or rounded floats are rarely of unit length, though; players differ
 in their treatment of that, and some do not rotate at constant speed. An error bound holds in a player only if it was
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Bools, Floats
+from anim.arrays import Bools, Floats, Ints
 from anim.errors import RangeError, check_type
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, ValueKind
@@ -30,15 +30,13 @@ BABYLON_LERP_DOT = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this do
 class PlayerModel:
     """Interpolation of rotations by a player.
 
-    about: players that use it. between: (a, b, u) with keys (..., 4) and u (..., 1) → (..., 4), None for glTF's slerp.
-    normalizes: whether values at keys, of STEP and outside the keys are normalized.
+    about: players that use it. normalizes: whether values at keys, of STEP and outside the keys are normalized.
     arc: (a, b) with keys (4, ...) in one hemisphere, normalized for GLTF → the angle θ (...) in radians, 0 for a line,
     of (sin((1 − u)θ)·a + sin(uθ)·b) / sin θ, and a mask (...) of those that are then normalized.
     """
 
     about: str
     arc: Callable[[Floats, Floats], tuple[Floats, Bools]]
-    between: Callable[[Floats, Floats, Floats], Floats] | None = None
     normalizes: bool = True
 
 
@@ -65,56 +63,49 @@ def parse_pair(player: str) -> tuple[str, str]:
 
 def sampler(player: str) -> Sampler:
     """Return the function that samples tracks like a player, a name in PLAYERS."""
-    chosen = PLAYERS[player]
-    if chosen.between is None:
+    if player == GLTF:
         return sample_batch
+    chosen = PLAYERS[player]
     return lambda batch, at, place: _sample_batch(chosen, batch, at, place)
 
 
 def _sample_batch(player: PlayerModel, batch: Batch | MixedBatch, at: Floats, place: KeyInterval) -> Floats:
     """Values (F, G, C) of tracks; players differ in LINEAR and STEP rotations only."""
-    if player.between is None or batch.kind is not ValueKind.ROTATION:
-        return batch.sample(at, place)
-    if batch.interpolation is Interpolation.CUBICSPLINE:
+    if batch.kind is not ValueKind.ROTATION or batch.interpolation is Interpolation.CUBICSPLINE:
         return batch.sample(at, place)
     start = batch.values[place.left]
     held = quaternion.normalize(start) if player.normalizes else start
     inside = batch.is_inside(at)
     if batch.interpolation is Interpolation.STEP or not inside.any():
         return held
-    result = held.copy()
-    end, u = batch.values[place.right[inside]], place.u[inside]
-    result[inside] = player.between(start[inside], end, u.reshape(u.shape + (1,) * (end.ndim - u.ndim)))
-    return result
+    u = place.u[inside]
+    held[inside] = _mix(
+        player, batch.values, place.left[inside], u.reshape(u.shape + (1,) * (held.ndim - inside.ndim - 1))
+    )
+    return held
 
 
-def _chord(a: Floats, b: Floats, u: Floats) -> Floats:
-    """Normalized chord on the shorter side, of keys as stored."""
-    return quaternion.normalize(a + u * (_align_sign(a, b) - a))
+def _mix(player: PlayerModel, keys: Floats, left: Ints, u: Floats) -> Floats:
+    """Mixes of neighboring keys (K, ..., 4): each of `left` (F,) and the next, at parameters u (F, ...).
 
-
-def _three_slerp(a: Floats, b: Floats, u: Floats) -> Floats:
-    """Interpolation by three.js: slerp of keys as stored, for near keys the normalized chord."""
-    return _slerp_stored(a, b, u, THREE_NLERP_DOT, quaternion.normalize)
-
-
-def _babylon_slerp(a: Floats, b: Floats, u: Floats) -> Floats:
-    return _slerp_stored(a, b, u, BABYLON_LERP_DOT, lambda chord: chord)
-
-
-def _slerp_stored(a: Floats, b: Floats, u: Floats, short: float, finish: Callable[[Floats], Floats]) -> Floats:
-    """Shoemake's formula on keys as stored, of any length; from the dot product `short` on the chord."""
-    b = _align_sign(a, b)
-    dot = (a * b).sum(axis=-1, keepdims=True)
-    is_short = dot >= short
-    theta = np.arccos(np.where(is_short, 0.0, dot))
-    arc = (np.sin((1 - u) * theta) * a + np.sin(u * theta) * b) / np.sin(theta)
-    chord = finish(a + u * (b - a))
-    return np.where((a == b).all(axis=-1, keepdims=True), a, np.where(is_short, chord, arc))
-
-
-def _align_sign(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.where((a * b).sum(axis=-1, keepdims=True) < 0, -b, b))
+    What depends on the keys alone is computed once per key, not per time.
+    """
+    first = int(left.min())
+    keys, left = keys[first : int(left.max()) + 2], left - first
+    a, b = keys[:-1], keys[1:]
+    b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
+    theta, divided = player.arc(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0))
+    if theta.any():
+        angle = (theta / np.pi)[left]
+        whole = np.sinc(angle)
+        of_a, of_b = (1 - u) * np.sinc((1 - u) * angle) / whole, u * np.sinc(u * angle) / whole
+    else:
+        of_a, of_b = 1 - u, u
+    mixed = of_a[..., None] * a[left] + of_b[..., None] * b[left]
+    divided = divided[left]
+    if divided.any():
+        mixed[divided] = quaternion.normalize(mixed[divided])
+    return np.asarray(mixed)
 
 
 def _slerp_arc(a: Floats, b: Floats) -> tuple[Floats, Bools]:
@@ -149,14 +140,9 @@ GLTF = "spec"  # the player that normalizes keys first; arcs between them are of
 
 PLAYERS = {
     GLTF: PlayerModel("glTF: slerp of normalized keys", _slerp_arc),
-    "three": PlayerModel(
-        "three.js: slerp of keys as stored, normalized only if they are close",
-        _three_arc,
-        _three_slerp,
-        False,
-    ),
-    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _babylon_arc, _babylon_slerp, False),
-    "nlerp": PlayerModel("Unity (glTFast), Blender: linear by component, then normalized", _chord_arc, _chord),
+    "three": PlayerModel("three.js: slerp of keys as stored, normalized only if they are close", _three_arc, False),
+    "raw": PlayerModel("Babylon.js: slerp of keys as stored, never normalized", _babylon_arc, False),
+    "nlerp": PlayerModel("Unity (glTFast), Blender: linear by component, then normalized", _chord_arc),
 }
 
 

@@ -65,18 +65,23 @@ def interpolate(
 
     tangents: in and out, shaped as the values, per second, for CUBICSPLINE. Rotations are normalized.
     """
+    is_rotation = kind is ValueKind.ROTATION
+    is_early = is_rotation and interpolation is not Interpolation.CUBICSPLINE and len(values) < len(place.left)
+    if is_early:  # once per key, not per time
+        values = quaternion.normalize(values)
     start = values[place.left]
     if interpolation is Interpolation.STEP or not place.u.any():  # all at keys, whose values are exact
-        return quaternion.normalize(start) if kind is ValueKind.ROTATION else start
+        return quaternion.normalize(start) if is_rotation and not is_early else start
     shape = place.u.shape + (1,) * (values.ndim - 1)
     u, end = place.u.reshape(shape), values[place.right]
     if interpolation is Interpolation.CUBICSPLINE and tangents is not None:
         arriving, leaving = tangents
         duration = place.duration.reshape(shape)
         result = hermite.evaluate(u, start, duration * leaving[place.left], end, duration * arriving[place.right])
-        return _unit(result, start) if kind is ValueKind.ROTATION else result
-    if kind is ValueKind.ROTATION:
-        return quaternion.slerp(quaternion.normalize(start), quaternion.normalize(end), u[..., 0])
+        return _unit(result, start) if is_rotation else result
+    if is_rotation:
+        a, b = (start, end) if is_early else (quaternion.normalize(start), quaternion.normalize(end))
+        return quaternion.slerp(a, b, u[..., 0])
     return start + u * (end - start)
 
 

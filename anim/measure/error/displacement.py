@@ -246,8 +246,9 @@ def largest_over(points: Floats, moved: Floats) -> Floats:
     """Return the largest displacement (J, F) of points (J, P, 3) by matrix differences (J, F, 3, 4)."""
     whole = np.concatenate((points, np.ones((*points.shape[:-1], 1))), axis=-1)
     columns = np.swapaxes(moved, 1, 3)  # (J, 4, 3, F)
-    displaced = (whole @ columns.reshape(len(moved), 4, -1)).reshape(*whole.shape[:2], 3, -1)  # one product per joint
+    displaced = whole @ columns.reshape(len(moved), 4, 3 * moved.shape[1])  # one product per joint
     displaced *= displaced
+    displaced = displaced.reshape(*whole.shape[:2], 3, moved.shape[1])
     squares = displaced[:, :, 0] + displaced[:, :, 1]
     squares += displaced[:, :, 2]
     return np.asarray(np.sqrt(squares.max(axis=1)))

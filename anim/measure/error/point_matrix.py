@@ -79,7 +79,7 @@ class PointMatrix:
     def places(self, world: Floats) -> Floats:
         """Return the positions of the points (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
         places = self._matrix @ stack_points(world, self.nodes)
-        return np.swapaxes(places.reshape(len(self), 3, -1), 1, 2)
+        return np.swapaxes(places.reshape(len(self), 3, world.shape[1]), 1, 2)
 
     def on(self, below: Bools) -> Bools:
         """Return the mask (P,) of points with a noticeable weight on the nodes `below` (N,).
@@ -99,13 +99,13 @@ class PointRows:
     def moves(self, columns: Floats) -> Floats:
         """Return displacements (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
         moved = self._matrix @ columns.astype(np.float32)
-        return np.asarray(moved).reshape(len(moved), 3, -1)
+        return np.asarray(moved).reshape(len(moved), 3, columns.shape[1] // 3)
 
 
 def stack_points(world: Floats, nodes: Ints) -> Floats:
     """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, all y, all z."""
     chosen = world[nodes]
-    return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), -1)
+    return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), 3 * world.shape[1])
 
 
 def sample_points(

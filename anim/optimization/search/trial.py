@@ -244,7 +244,7 @@ class BoundUsage:
 
     def _world(self, shown: Sequence[Floats]) -> Floats:
         """World matrices (N, W, 3, 4); only nodes that a track may change get new local matrices."""
-        local = self._local.copy()
+        local = self._local.copy(order="K")
         changing = self._changing
         local[changing] = matrix.from_trs(*(part[changing] for part in shown))
         return matrix.accumulate_world(local, self._skeleton.parents, list(self._source.levels))
