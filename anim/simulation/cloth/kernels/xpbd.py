@@ -22,7 +22,7 @@ from anim.simulation.cloth.kernels.self_collision import separate_points
 from anim.simulation.cloth.kernels.wind import add_wind
 from anim.skinning.kernels.jit import jit
 
-REPEATED_LEVELS = 2  # finest levels of distant pairs, in every sweep of the limits
+REPEATED_LEVELS = 2  # finest levels of distant pairs, once more before the limits of edges
 
 
 @jit
@@ -62,7 +62,8 @@ def step_frame(
     the end of the step before, see `push_out`. wind: (S, 3) m/s. at_rest: (P, 3), for pairs that self-collision
     leaves alone. numbers: substep s, gravity x, y, z m/s², compliance of edges and of hinges m/N, damping 1/s, density
     of air kg/m³, floor m, thickness m, friction, self-collision thickness m or 0. iterations: of the constraints in
-    each substep. limit_sweeps: at most so many of `limit_elongation`, until no edge is too long. longest, elongation:
+    each substep. limit_sweeps: at most so many of `limit_elongation`, until no edge is too long: fine meshes need all
+    of them, having more edges of which one may be, so nothing else is repeated with them. longest, elongation:
     (S, 2), filled with `find_longest` at the end of each substep.
     """
     h, damping, air = numbers[0], numbers[6], numbers[7]
@@ -96,8 +97,9 @@ def step_frame(
         for _ in range(iterations):
             project_distances(p, w, edges, edge_lengths, stretch, edge_multipliers)
             project_distances(p, w, hinges, hinge_lengths, bend, hinge_multipliers)
-        for _ in range(limit_sweeps):
+        if limit_sweeps > 0:
             shorten_pairs(p, w, distant, distances, levels[-1 - min(REPEATED_LEVELS, len(levels) - 1)], len(distant))
+        for _ in range(limit_sweeps):
             if not limit_elongation(p, w, outward, most, order, stretch, edge_multipliers):
                 break
         if own > 0.0 and s % 2 == 0:
