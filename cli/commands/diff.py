@@ -177,7 +177,8 @@ def _write_page(
 
 def _are_bake_and_source(one: _Side, other: _Side) -> bool:
     is_book = one.is_flipbook or other.is_flipbook
-    return is_book or is_bake_of(one.scene, other.scene) or is_bake_of(other.scene, one.scene)
+    counts = len(one.clips), len(other.clips)
+    return is_book or is_bake_of(one.scene, other.scene, counts[1]) or is_bake_of(other.scene, one.scene, counts[0])
 
 
 def _by_vertex(report: VertexReport, format: Format, fail_above: str | None, voice: Reporter, *, quiet: bool) -> None:

@@ -25,8 +25,9 @@ def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str 
         old, new = (read_scene(each.document, each.name, voice) for each in (one, other))
         clips = reader.clips(one.document), reader.clips(other.document)
         is_cached = one.cache is not None or other.cache is not None
-        if is_cached or is_bake_of(old, new) or is_bake_of(new, old):
-            meshes = pair_cache_meshes(one, other) if is_cached else _pair_bake(old, new)
+        counts = len(clips[0]), len(clips[1])
+        if is_cached or is_bake_of(old, new, counts[1]) or is_bake_of(new, old, counts[0]):
+            meshes = pair_cache_meshes(one, other) if is_cached else _pair_bake(old, new, counts[1])
             partners = {_played(clips, clip): 0} if len(clips[1]) == 1 else {}
             return PageContent(partners=partners, meshes=meshes)
         ruler = ErrorMetric(old, new)
@@ -42,9 +43,9 @@ def _played(clips: tuple[Sequence[Clip], Sequence[Clip]], clip: str | None) -> i
     return next((names.index(name) for name in (clip, clips[1][0].name) if name in names), 0)
 
 
-def _pair_bake(old: Scene, new: Scene) -> PairedMeshes:
+def _pair_bake(old: Scene, new: Scene, num_clips: int) -> PairedMeshes:
     """Meshes of a file and its bake, in either order."""
-    if is_bake_of(old, new):
+    if is_bake_of(old, new, num_clips):
         return pair_nodes(node_pairs(old, new))
     baked, source = pair_nodes(node_pairs(new, old))
     return source, baked

@@ -94,7 +94,7 @@ def _motions(one: _Side, other: _Side, globs: Sequence[str], voice: Reporter) ->
         return clip.name, first, second
     assert one.document is not None
     assert other.document is not None
-    if vertex_motion.is_bake_of(one.scene_of(), other.scene_of()):
+    if vertex_motion.is_bake_of(one.scene_of(), other.scene_of(), len(reader.names(other.document))):
         return _of_documents((one, one.document), (other, other.document), globs, voice)
     label, second, first = _of_documents((other, other.document), (one, one.document), globs, voice)
     return label, first, second

@@ -15,9 +15,11 @@ from anim.caches.transforms.resample import resample_frames
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import RangeError
 from anim.gltf.document import Document
-from anim.model import Clip, MeshInstance, Scene, VertexCache
+from anim.model import Clip, Mesh, MeshInstance, Scene, VertexCache
 from anim.sampling.times import frame_times
 from anim.skinning.bake import bake
+
+TARGET_TOLERANCE = 1e-3  # of the largest offset, of targets that are stored as integers
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,12 +90,24 @@ def pages_of(document: Document) -> VertexCache | None:
     return read_pages(document)
 
 
-def is_bake_of(old: Scene, new: Scene) -> bool:
-    """Return whether a skinned or morphed mesh of the old scene is without a skin in the new one."""
+def is_bake_of(old: Scene, new: Scene, num_clips: int) -> bool:
+    """Return whether the new scene has a skinned or morphed mesh of the old one with morph targets of its own.
+
+    num_clips: of the new file. A bake has at most one: files with more, and other morph targets, are two versions.
+    """
+    pairs = ((old.instances[i], new.instances[k]) for i, k in _pairs(old, new))
     return any(
-        old.instances[i].skin is not None and new.instances[k].skin is None and len(new.instances[k].mesh.targets)
-        for i, k in _pairs(old, new)
+        before.skin is not None or (num_clips <= 1 and _has_other_targets(before.mesh, after.mesh))
+        for before, after in pairs
+        if after.skin is None and len(after.mesh.targets)
     )
+
+
+def _has_other_targets(old: Mesh, new: Mesh) -> bool:
+    """Return True for two morphed meshes with different targets: weights of one mean nothing to the other."""
+    if not len(old.targets) or old.targets.shape != new.targets.shape:
+        return len(old.targets) > 0
+    return float(np.abs(old.targets - new.targets).max()) > TARGET_TOLERANCE * float(np.abs(old.targets).max())
 
 
 def node_pairs(old: Scene, new: Scene) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.conftest import Call, Find
+from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal
 from tests.files import glb_of, opened_fixture
 from tests.textured import textured
@@ -37,6 +37,24 @@ def test_every_format_is_within_its_error(call: Call, source: Path, ending: str)
         assert found["measured_at"] == "vertices"
         assert 0 < found["max_error_m"] < 1e-3
         assert found["clips"][0]["clip"] == "bend"
+
+
+@pytest.mark.parametrize("more", [(), ("--quantize",), ("--layout", "flip-scale")])
+def test_a_bake_of_morph_targets(call: Call, fixture: Fixture, tmp_path: Path, more: tuple[str, ...]) -> None:
+    """The weights of the bake's own targets mean nothing to the source: only vertices can be compared."""
+    source, out = fixture("morph_cube"), tmp_path / "out.glb"
+    bound = () if "--layout" in more else ("--max-error", "0.1mm")
+    assert call("bake", source, out, "--clip", "cubic", "--fps", 240, *bound, *more).code == 0
+    for files in ((source, out), (out, source)):
+        found = call("diff", *files, "--clip", "cubic", "--format", "json").json
+        assert found["measured_at"] == "vertices"
+        assert 0 < found["max_error_m"] < (0.05 if "--layout" in more else 1e-3)
+
+
+def test_versions_of_morphed_files_are_compared_by_joints(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    source, out = fixture("morph_cube"), tmp_path / "out.glb"
+    assert call("optimize", source, out, "--max-error", "1mm").code == 0
+    assert call("diff", source, out, "--format", "json").json["measured_at"] != "vertices"
 
 
 def test_a_changed_vertex_is_named(call: Call, source: Path) -> None:
