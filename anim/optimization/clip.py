@@ -200,7 +200,7 @@ class _TrackSorter:
         runner = TrialRunner(
             context.skeleton,
             found,
-            BoundUsage(context.skeleton, found, context.points, allowed, replace(context.bounds, max_error=bound)),
+            BoundUsage(context.skeleton, found, allowed, replace(context.bounds, max_error=bound)),
             context.coding,
             np.array([self._is_droppable(i) for i in free], np.bool_),
             [self._task.shared[i] for i in free],

@@ -68,6 +68,16 @@ class PointMatrix:
         """Return some of the points, by index."""
         return PointMatrix(self.nodes, self.joints[chosen], self.factors[chosen])
 
+    def rebind(self, bindings: Ints, offsets: Floats) -> PointMatrix:
+        """Return the same points on other nodes: `bindings[n]` (N,) instead of n.
+
+        offsets: (N, 3, 4) from the space of the old node to that of the new one.
+        """
+        nodes, place = np.unique(bindings[self.nodes], return_inverse=True)
+        moved = np.einsum("piab,pib->pia", offsets[self.nodes][self.joints], self.factors)
+        factors = np.concatenate((moved, self.factors[..., 3:]), axis=-1)
+        return PointMatrix(nodes, place.reshape(-1)[self.joints], factors)
+
     def distinct(self, labels: Ints) -> Ints:
         """Return the indices of points (increasing) that differ from all before them with the same label (P,)."""
         rows = np.column_stack((labels, self.joints, self.factors.reshape(len(self), -1)))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints, unique_sorted
-from anim.maths import quaternion
+from anim.maths import matrix, quaternion
 from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.model.time_axis import merge_times
@@ -19,6 +19,7 @@ from anim.optimization.search.playback import level_world_matrices, required_lev
 from anim.optimization.tracks.clip_ends import closure_sign
 from anim.sampling import PoseSampler, times
 from anim.sampling.players import sampler
+from anim.sampling.world import local_matrices
 
 CUBIC_STEP = 1 / 60  # s; sample step of splines, with at least CUBIC_SEGMENTS samples per segment
 CUBIC_SEGMENTS = 8
@@ -57,8 +58,8 @@ class SourceMotion:
     grid: (K,) s, possible key times. at: (W,) s, the grid and times between. on_grid: (K,) indices of the grid in `at`.
     moving: (G) tracks of the search. own: (G, K) mask of source keys, all for splines. answering: (G, P) mask of the
     points that each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes.
-    levels: of the nodes with points. columns: (4 J, 3 W) world matrices of the points' nodes; by_chord: the same with
-    nlerp.
+    points: on nodes that move in their parents' space, or are roots. levels: of these nodes. columns: (4 J, 3 W) world
+    matrices of the points' nodes; by_chord: the same with nlerp.
     """
 
     grid: Floats
@@ -68,6 +69,7 @@ class SourceMotion:
     own: Bools
     answering: Bools
     local: tuple[Floats, Floats, Floats]
+    points: PointMatrix
     levels: tuple[Ints, ...]
     columns: Floats
     by_chord: Floats
@@ -93,13 +95,16 @@ def analyze_source(
     at = grid if reference is Reference.KEYS else measurement_times(grid, clip.tracks)
     poses = PoseSampler(skeleton, clip)
     local = _local(poses, at)
+    matrices = local_matrices(skeleton, local)
     levels = required_levels(skeleton, points.nodes)
-    world = level_world_matrices(skeleton, local, levels)
+    world = matrix.accumulate_world(matrices, skeleton.parents, list(levels))
     nodes = {track.node for track in tracks if track.node is not None}
     reach = _influence_radius(world, points, {node: below[node] for node in nodes})
     widening = _widening(skeleton, world, levels)
     moving = _source_tracks(clip, free, skeleton, local, reach, widening, chord_tolerance)
     answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
+    points = _on_moving_nodes(points, skeleton, matrices, levels, nodes)
+    levels = required_levels(skeleton, points.nodes)
     columns = stack_points(world, points.nodes)
     by_chord = columns
     if any(
@@ -115,6 +120,7 @@ def analyze_source(
         np.array([_source_keys(track, grid) for track in tracks]).reshape(len(tracks), len(grid)),
         answering,
         local,
+        points,
         levels,
         columns,
         by_chord,
@@ -226,6 +232,24 @@ def _influence_radius(world: Floats, points: PointMatrix, answering: dict[int, B
         away *= away
         found[node] = math.sqrt((away[:, 0] + away[:, 1] + away[:, 2]).max(initial=0.0))
     return found
+
+
+def _on_moving_nodes(
+    points: PointMatrix, skeleton: Skeleton, local: Floats, levels: Sequence[Ints], free: Set[int]
+) -> PointMatrix:
+    """The points on their nearest nodes that move in their parents' space, or are `free` to: fewer world matrices.
+
+    local: matrices (N, W, 3, 4). levels: of the nodes with points.
+    """
+    moves = (local != local[:, :1]).any(axis=(1, 2, 3))
+    moves[list(free)] = True
+    nearest, offsets = np.arange(len(skeleton)), np.tile(np.eye(4)[:3], (len(skeleton), 1, 1))
+    for level in levels[1:]:
+        constant = level[~moves[level]]
+        above = skeleton.parents[constant]
+        nearest[constant] = nearest[above]
+        offsets[constant] = matrix.multiply(offsets[above], local[constant, 0])
+    return points.rebind(nearest, offsets)
 
 
 def _widening(skeleton: Skeleton, world: Floats, levels: Sequence[Ints]) -> Floats:

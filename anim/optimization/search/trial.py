@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix, quaternion
-from anim.measure.error.point_matrix import PointMatrix, stack_points
+from anim.measure.error.point_matrix import stack_points
 from anim.model import Skeleton
 from anim.optimization.options import Bounds
 from anim.optimization.search import playback
@@ -98,7 +98,7 @@ class TrialRunner:
     @cached_property
     def leeway(self) -> Floats:
         """Ratio of each track's moment arm to the compensated one (G,)."""
-        return budget_gain(self._skeleton, self.source, self._usage.points)
+        return budget_gain(self._skeleton, self.source, self.source.points)
 
     def _key_candidates(
         self, aim: RotationTarget, axes: Sequence[SharedAxis], tolerances: Sequence[float], rotation: Floats
@@ -198,14 +198,11 @@ class BoundUsage:
     allowed: (P,) m, error bound of each point.
     """
 
-    def __init__(
-        self, skeleton: Skeleton, source: SourceMotion, points: PointMatrix, allowed: Floats, bounds: Bounds
-    ) -> None:
+    def __init__(self, skeleton: Skeleton, source: SourceMotion, allowed: Floats, bounds: Bounds) -> None:
         self.bounds = bounds
         self._skeleton = skeleton
         self._source = source
-        self.points = points
-        self._rows = points.rows()
+        self._rows = source.points.rows()
         self._allowed = allowed
         self._local = local_matrices(skeleton, source.local)
         self._changing = np.array(sorted({each.node for each in source.moving}), np.int64)
@@ -235,7 +232,7 @@ class BoundUsage:
         return own
 
     def _usage(self, shown: Sequence[Floats], columns: Floats) -> Floats:
-        moved = self._rows.moves(stack_points(self._world(shown), self.points.nodes) - columns)
+        moved = self._rows.moves(stack_points(self._world(shown), self._source.points.nodes) - columns)
         usage = _longest(moved) / self._allowed
         if self.bounds.max_speed_error is not None and len(self._source.at) > 1:
             gaps = np.maximum(np.diff(self._source.at), MIN_INTERVAL_S).astype(np.float32)

@@ -39,7 +39,7 @@ def test_the_largest_distance_of_each_point() -> None:
     source = truth_of(OF, waving(), POINTS)
     shown = _changed(source)
     expected = np.linalg.norm(_moves(source, shown), axis=2).max(axis=1) / ALLOWED
-    usage = BoundUsage(OF.skeleton, source, POINTS, ALLOWED, Bounds(0.1, 0.0))
+    usage = BoundUsage(OF.skeleton, source, ALLOWED, Bounds(0.1, 0.0))
     assert usage.slerp_raw(shown) == pytest.approx(expected, rel=1e-5)
     assert usage.slerp_raw(source.local).max() == 0
 
@@ -51,11 +51,11 @@ def test_speeds_count_where_they_are_bounded() -> None:
     gaps = np.maximum(np.diff(source.at), MIN_INTERVAL_S)
     speeds = np.linalg.norm(np.diff(moves, axis=1), axis=2) / gaps
     expected = np.maximum(np.linalg.norm(moves, axis=2).max(axis=1) / ALLOWED, speeds.max(axis=1) / 0.3)
-    usage = BoundUsage(OF.skeleton, source, POINTS, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
+    usage = BoundUsage(OF.skeleton, source, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
     assert usage.slerp_raw(shown) == pytest.approx(expected, rel=1e-4)
 
 
 def test_without_a_bound_on_angles_tracks_have_no_strain_of_their_own() -> None:
     source = truth_of(OF, waving(), POINTS)
-    usage = BoundUsage(OF.skeleton, source, POINTS, ALLOWED, Bounds(0.1, 0.0))
+    usage = BoundUsage(OF.skeleton, source, ALLOWED, Bounds(0.1, 0.0))
     assert not usage.own(_changed(source)).any()

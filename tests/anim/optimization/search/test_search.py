@@ -19,7 +19,7 @@ def _bench(bound: float) -> TrialRunner:
     source = truth_of(OF, waving(), points)
     count = len(source.moving)
     allowed = np.full(len(points), bound)
-    usage = BoundUsage(OF.skeleton, source, points, allowed, Bounds(bound, 0.0))
+    usage = BoundUsage(OF.skeleton, source, allowed, Bounds(bound, 0.0))
     return TrialRunner(OF.skeleton, source, usage, CORE, np.ones(count, bool), [()] * count)
 
 

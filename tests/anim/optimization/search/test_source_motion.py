@@ -73,7 +73,17 @@ def test_columns_are_the_sampled_pose() -> None:
     source = truth_of(of, what, points)
     assert (source.at[source.on_grid] == source.grid).all()
     expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, source.at)).swapaxes(0, 1)
-    assert source.columns == pytest.approx(stack_points(expected, points.nodes), abs=1e-12)
+    assert source.columns == pytest.approx(stack_points(expected, source.points.nodes), abs=1e-12)
+
+
+def test_points_of_nodes_that_move_with_their_parents_are_on_those() -> None:
+    of = scene(scale_shear=0.3)
+    what = clip(track("rotation", [0, 1, 2], about("y", [0, 60, 90]), node=1))
+    points = every_point(of)
+    source = truth_of(of, what, points)
+    assert set(source.points.nodes.tolist()) <= {0, 1} < set(points.nodes.tolist())
+    world = world_matrices(of.skeleton, sample_pose(of.skeleton, what, source.at)).swapaxes(0, 1)
+    assert source.points.places(world) == pytest.approx(points.places(world), abs=1e-9)
 
 
 def test_keys_only() -> None:
@@ -106,7 +116,7 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
     points = every_point(of)
     source = truth_of(of, what, points)
     rng = np.random.default_rng(seed)
-    before = points.places(level_world_matrices(of.skeleton, source.local, source.levels))
+    before = source.points.places(level_world_matrices(of.skeleton, source.local, source.levels))
     for g, each in enumerate(source.moving):
         local = tuple(part.copy() for part in source.local)
         change = 1e-4 * rng.normal(size=each.values.shape)
@@ -115,7 +125,7 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
             changed = quaternion.normalize(changed)
             change = changed - each.values
         local[PATHS.index(each.path)][each.node] = changed
-        after = points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), source.levels))
+        after = source.points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), source.levels))
         moved = np.linalg.norm(after - before, axis=2)
         allowed = each.meters * np.linalg.norm(change, axis=1).max()
         assert moved[source.answering[g]].max(initial=0.0) <= slack * allowed

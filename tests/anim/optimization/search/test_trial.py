@@ -34,7 +34,7 @@ def _bench(
     points: PointMatrix = every_point(of)
     source: SourceMotion = truth_of(of, what, points)
     count = len(source.moving)
-    usage = BoundUsage(of.skeleton, source, points, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
+    usage = BoundUsage(of.skeleton, source, np.full(len(points), BOUND), bounds or Bounds(BOUND, 0.0))
     values = [() if shared is None else (shared,)] * count
     return TrialRunner(of.skeleton, source, usage, CORE, np.full(count, droppable), values)
 
