@@ -14,6 +14,7 @@ from anim.sampling import rest_world
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
 
 SCALE_TOLERANCE = 1e-3  # of a scale of 1
+MIN_NOTED_ANGLE_DEG = 1.0  # between a bone as drawn and as simulated; less is hardly seen
 
 
 def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
@@ -102,6 +103,25 @@ def scaled_colliders(skeleton: Skeleton, bones: SpringBones) -> tuple[str, ...]:
             notes.append(
                 f"collider {index} on {skeleton.label(collider.node)} has a scale of {scale.max():.4g}, its radius of "
                 f"{collider.radius:.4g} m is not scaled, as in players"
+            )
+    return tuple(notes)
+
+
+def uneven_joints(skeleton: Skeleton, bones: SpringBones) -> tuple[str, ...]:
+    """Return a note for each joint whose own scale at rest turns its bone, which spring bones don't count.
+
+    The scales of nodes above it do count.
+    """
+    notes = []
+    for joint in (joint for chain in bones.chains for joint in chain.joints):
+        tail, scale = tail_at_rest(skeleton, joint), skeleton.scale[joint.node]
+        drawn = scale * tail
+        angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(tail, drawn)), tail @ drawn)))
+        if np.abs(drawn).max() > 0 and angle > MIN_NOTED_ANGLE_DEG:
+            sizes = " × ".join(f"{each:.4g}" for each in scale)
+            notes.append(
+                f"{skeleton.label(joint.node)} has an uneven scale, {sizes}: its bone is drawn {angle:.2g}° from where "
+                "it swings, as in players"
             )
     return tuple(notes)
 

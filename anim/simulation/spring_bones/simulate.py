@@ -14,7 +14,7 @@ from anim.sampling.times import distinct_float32, frame_times
 from anim.simulation.integrators import find_integrator
 from anim.simulation.spring_bones.chain_globs import drop_inert_joints
 from anim.simulation.spring_bones.chains import SpringBones
-from anim.simulation.spring_bones.hierarchy import check_hierarchy, scale_bones, scaled_colliders
+from anim.simulation.spring_bones.hierarchy import check_hierarchy, scale_bones, scaled_colliders, uneven_joints
 from anim.simulation.spring_bones.loop import LoopedMotion, run_loop
 from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
 from anim.simulation.steps import Steps
@@ -107,7 +107,12 @@ def simulate_springs(
         float(deflection.max(initial=0.0)),
         float(speeds.max(initial=0.0)),
         looped,
-        (*bones.notes, *notes, *(() if options.scale_aware else scaled_colliders(skeleton, bones))),
+        (
+            *bones.notes,
+            *notes,
+            *uneven_joints(skeleton, bones),
+            *(() if options.scale_aware else scaled_colliders(skeleton, bones)),
+        ),
         motion.elongation,
         motion.energies.sum(axis=1),
     )

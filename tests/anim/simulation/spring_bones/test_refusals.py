@@ -48,6 +48,20 @@ def test_a_collider_on_a_scaled_node_is_noted() -> None:
     assert simulate_springs(CHAIN, swaying(), ball).notes == ()
 
 
+@pytest.mark.parametrize(
+    ("scale", "noted"), [((1.0, 2.0, 1.0), True), ((2.0, 2.0, 2.0), False), ((1.0, 1.0, 3.0), False)]
+)
+def test_a_joint_whose_own_scale_turns_its_bone_is_noted(scale: tuple[float, float, float], noted: bool) -> None:
+    """The tail is at (1, −1, 0): twice as far down it is drawn atan 2 − 45° lower."""
+    slanted = skeleton(
+        [-1, 0, 1, 2],
+        translation=[[0, 0, 0], [0, 1, 0], [1, -1, 0], DOWN],
+        scale=[[1, 1, 1], scale, [1, 1, 1], [1, 1, 1]],
+    )
+    words = "node 1 '1' has an uneven scale, 1 × 2 × 1: its bone is drawn 18° from where it swings, as in players"
+    assert simulate_springs(slanted, swaying(), BONES).notes == (words,) * noted
+
+
 SELF = SpringBones((replace(ONE, colliders=(0,)),), (Collider(2, ColliderShape.SPHERE, radius=0.1),))
 TWICE = SpringBones((ONE, replace(ONE, name="again")))
 
