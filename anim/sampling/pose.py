@@ -121,6 +121,16 @@ class PosedSkeleton:
         """World matrices (N, F, 3, 4)."""
         return world_by_node(self.skeleton, self.pose)
 
+    def take(self, frames: Ints) -> PosedSkeleton:
+        """Return the skeleton at some of the times, by index, without sampling again."""
+        pose = self.pose
+        weights = {node: each[frames] for node, each in pose.weights.items()}
+        parts = pose.translation[frames], pose.rotation[frames], pose.scale[frames]
+        taken = PosedSkeleton(self.skeleton, Pose(pose.times[frames], *parts, weights))
+        columns = np.take(np.swapaxes(self.world, 1, 3), frames, axis=-1)  # contiguous over frames, as computed
+        taken.world = np.swapaxes(columns, 1, 3)
+        return taken
+
     def of(self, nodes: Ints) -> Floats:
         """Return the world matrices (J, F, 3, 4) of some nodes; −1 is the world itself."""
         found: Floats = self.world[nodes]

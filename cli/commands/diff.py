@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -24,22 +25,18 @@ from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
-from anim.show.page.comparison import ClipPair, compare_content
 from anim.show.plots import error_plot as picture
 from anim.show.plots.figure import FORMATS
 from anim.units import is_zero
 from cli import units
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
-from cli.io.page_output import check_page, page_file, write_page
 from cli.options import common
 from cli.options.common import Format
 from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length, plural
-from cli.workflows.cache_page import write_vertex_page
-from cli.workflows.page_comparison import worst_view
 from cli.workflows.vertex_diff import diff_by_vertex, is_cache
 from cli.workflows.vertex_motion import is_bake_of, pages_of
 
@@ -117,6 +114,8 @@ def command(
         raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
     kind = "" if plot is None else _kind(plot)
     if html is not None:
+        from cli.io.page_output import check_page  # imports readers of all formats, as in the functions below
+
         check_page(html, "--html")
         if new is None or player is not SPEC:
             raise UsageError("--html shows two files as glTF specifies (expected neither --player nor --players)")
@@ -132,6 +131,8 @@ def command(
         }
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, voice, opened=opened)
         if html is not None:
+            from cli.workflows.cache_page import write_vertex_page
+
             write_vertex_page(html, old, new, clip or (), found_by_vertex, voice)
         _by_vertex(found_by_vertex, format, fail_above, voice, quiet=quiet)
         return
@@ -169,6 +170,10 @@ def _write_page(
     path: str, report: DiffReport, ruler: ErrorMetric, one: tuple[str, _Side], other: tuple[str, _Side], voice: Reporter
 ) -> None:
     """Write the page of both files, with the table of clips."""
+    from anim.show.page.comparison import ClipPair, compare_content
+    from cli.io.page_output import page_file, write_page
+    from cli.workflows.page_comparison import worst_view
+
     pairs = [ClipPair(each.old, each.new, each.error, each.statistics.p99) for each in report.diff.clips]
     content = compare_content(ruler, one[1].clips, other[1].clips, pairs)
     files = [page_file(name, side.document, side.file.size) for name, side in (one, other)]
@@ -249,9 +254,10 @@ def _names(one: _Side, other: _Side) -> tuple[int, bool]:
 def _ambiguous(one: File, other: File, chosen: Sequence[int] | None) -> Iterator[str]:
     """Yield notes on clip names with another count in the other file. chosen: clip indices of A."""
     looked_at = set(one.clips if chosen is None else (one.clips[i] for i in chosen))
+    numbers = Counter(one.clips), Counter(other.clips)
     for name in ambiguous_names(one.clips, other.clips):
         if name in looked_at:
-            counts = one.clips.count(name), other.clips.count(name)
+            counts = numbers[0][name], numbers[1][name]
             yield (
                 f"{one.name} has {plural(counts[0], 'clip')} named '{name}' and {other.name} has {counts[1]}: "
                 "they are matched in their order, which may be wrong"

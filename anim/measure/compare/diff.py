@@ -178,7 +178,7 @@ def _compare_clips(
     if len(set(parse_pair(player))) == 1:
         proof = prover.certified(before, after, times, look)
         error, bound = proof.error, proof.bound
-    found = statistics(ruler, before, after, times=times, player=player, fps=fps)
+    found = statistics(ruler, before, after, times=times, block=look.block, player=player, fps=fps)
     one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))
     missing = tuple(name for key, name in one.items() if key not in other)
     added = tuple(name for key, name in other.items() if key not in one)

@@ -56,25 +56,27 @@ class MotionError:
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorSamples:
-    """Errors at some times (F,), in one or several players.
-
-    error, player: the largest, and the player with it. limits: by player, of each part of the metric (G, F) in m,
-    upper bounds of the displacement of a group's vertices; 0 without joints. In float32, since there are many.
-    """
-
-    error: MotionError
-    player: str
-    limits: Mapping[str, Sequence[NDArray[np.float32]]]
-
-
-@dataclass(frozen=True, slots=True)
 class Block:
     """Some of the times (F,) in s, with the poses of both versions."""
 
     times: Floats
     old: PosedSkeleton
     new: PosedSkeleton
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorSamples:
+    """Errors at some times (F,), in one or several players.
+
+    error, player: the largest, and the player with it. block: the poses, if they are those of one player and one block.
+    limits: by player, of each part of the metric (G, F) in m,
+    upper bounds of the displacement of a group's vertices; 0 without joints. In float32, since there are many.
+    """
+
+    error: MotionError
+    player: str
+    limits: Mapping[str, Sequence[NDArray[np.float32]]]
+    block: Block | None = None
 
 
 class ErrorMetric:
@@ -120,7 +122,8 @@ class ErrorMetric:
             player: [np.zeros((len(part.groups), len(times)), np.float32) for part in self.combined]
             for player in players
         }
-        return ErrorSamples(*self._sampled(before, after, times, players, limits), limits)
+        error, player, block = self._sampled(before, after, times, players, limits)
+        return ErrorSamples(error, player, limits, block if len(players) == 1 else None)
 
     def _sampled(
         self,
@@ -129,12 +132,16 @@ class ErrorMetric:
         times: Floats,
         players: Sequence[str],
         limits: Mapping[str, Sequence[NDArray[np.float32]]] | None,
-    ) -> tuple[MotionError, str]:
-        """The largest error, and its player. limits: arrays to write the limits of groups into, or None."""
+    ) -> tuple[MotionError, str, Block | None]:
+        """The largest error, its player, and the block if there is only one.
+
+        limits: arrays to write the limits of groups into, or None.
+        """
         size, frame, place, joint, vertex, worst = 0.0, 0, "", -1, -1, players[0]
-        first = 0
+        first, only = 0, None
         for block in self._blocks_of_players(before, after, times, players):
             count = len(block.times) // len(players)
+            only = block if count == len(times) else None
             shown = ((i, part.field(block.old, block.new)) for i, part in enumerate(self.combined))
             fields = [(i, field) for i, field in shown if field is not None]
             for i, field in sorted(fields, key=lambda each: -float(each[1].limits.max())):
@@ -152,7 +159,7 @@ class ErrorMetric:
             first += count
         time = float(times[frame]) if len(times) else 0.0
         fraction, pointer = pointer_error(before, after, times)
-        return MotionError(size, time, place, self.called(joint), len(times), fraction, pointer, vertex), worst
+        return MotionError(size, time, place, self.called(joint), len(times), fraction, pointer, vertex), worst, only
 
     def _blocks_of_players(self, before: Clip, after: Clip, times: Floats, players: Sequence[str]) -> Iterator[Block]:
         """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 from anim.measure.error.displacement import lengths_by_group, max_displacement
 from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, ErrorMetric, dense_times
@@ -55,25 +55,27 @@ def statistics(
     after: Clip,
     *,
     times: Floats | None = None,
+    block: Block | None = None,
     player: str = "spec",
     fps: float = FPS,
 ) -> Statistics:
     """Return the statistics of the error of `after`, on the scenes of the metric.
 
     times: (F,) s, samples of distances, rotations and weights; `dense_times` by default.
-    player: a name in PLAYERS, for both clips. fps: frames per second of the grid for speeds, 120 by default.
+    block: the poses at `times`, if the caller has them. player: a name in PLAYERS, for both clips.
+    fps: frames per second of the grid for speeds, 120 by default.
     """
     times = dense_times(before, after, fps=fps) if times is None else times
     vertices = sum(len(group) for part in ruler.parts for group in part.groups)
     count = int(np.clip(MAX_SAMPLES // max(vertices, 1), 2, FRAMES))
     chosen = np.array(sorted(set(np.linspace(0, len(times) - 1, count).round().astype(np.int64).tolist())))
     found: list[Floats] = []
-    for block in ruler.blocks(before, after, times[chosen], player=player):
-        found += _distances(ruler, block)
+    for each in ruler.blocks(before, after, times[chosen], player=player) if block is None else [_take(block, chosen)]:
+        found += _distances(ruler, each)
     angle, weight = Peak(), Peak()
-    for block in ruler.blocks(before, after, times, player=player):
-        angle = max(angle, _rotation_errors(ruler, block), key=lambda each: each.size)
-        weight = max(weight, _weighted(ruler, block), key=lambda each: each.size)
+    for each in ruler.blocks(before, after, times, player=player) if block is None else [block]:
+        angle = max(angle, _rotation_errors(ruler, each), key=lambda peak: peak.size)
+        weight = max(weight, _weighted(ruler, each), key=lambda peak: peak.size)
     every = np.concatenate(found) if found else np.zeros(1)
     speed = speed_error(ruler, before, after, player=player, fps=fps)
     return Statistics(float(every.mean()), _percentile(every, 0.99), angle, speed, weight)
@@ -102,6 +104,10 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
                 time = float(block.times[top.frame] + block.times[top.frame + 1]) / 2
                 worst = Peak(top.length, time, part.name_of(top.group) or joint, joint, part.vertex(top))
     return worst
+
+
+def _take(block: Block, frames: Ints) -> Block:
+    return Block(block.times[frames], block.old.take(frames), block.new.take(frames))
 
 
 def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:

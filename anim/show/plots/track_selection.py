@@ -116,7 +116,7 @@ def _select(document: Document, selection: Selection, view: str) -> list[PlotTra
     found = []
     for number in selection.chosen_clips([clip.name for clip in clips]):
         clip = clips[number]
-        fps = _rate(clip)
+        span, fps = (clip.start, clip.end), _rate(clip)  # once per clip: a search over all tracks
         for i in sorted(selection.chosen_tracks(clip, skeleton)):
             track = _align(clip.tracks[i])
             labels = _labels(track, targets, view)
@@ -125,7 +125,7 @@ def _select(document: Document, selection: Selection, view: str) -> list[PlotTra
                 _printable_name(_target(track, skeleton)),
             )
             rest = IDENTITY if track.node is None else skeleton.rotation[track.node]
-            found.append(PlotTrack(name, target, track, labels, clip.start, clip.end, fps, None, view, rest))
+            found.append(PlotTrack(name, target, track, labels, *span, fps, None, view, rest))
     return found
 
 

@@ -38,6 +38,27 @@ def versions(request: pytest.FixtureRequest) -> tuple[Scene, Clip, Clip]:
     return reader.scene(document), before, Clip(before.name, slower)
 
 
+@pytest.mark.parametrize("player", ["spec", "nlerp"])
+def test_poses_of_the_error_give_the_same_statistics(versions: tuple[Scene, Clip, Clip], player: str) -> None:
+    scene, before, after = versions
+    ruler, times = ErrorMetric(scene, shell=0.1), dense_times(before, after)
+    block = ruler.sample_errors(before, after, times, players=(player,)).block
+    assert block is not None
+    assert len(times) > FRAMES
+    alone = statistics(ruler, before, after, times=times, player=player)
+    assert statistics(ruler, before, after, times=times, block=block, player=player) == alone
+
+
+def test_only_poses_of_one_player_and_block_are_kept(
+    versions: tuple[Scene, Clip, Clip], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, before, after = versions
+    ruler, times = ErrorMetric(scene), dense_times(before, after)
+    assert ruler.sample_errors(before, after, times, players=("spec", "nlerp")).block is None
+    monkeypatch.setattr(metric, "BLOCK", 100)
+    assert ruler.sample_errors(before, after, times).block is None
+
+
 def test_a_plain_loop_finds_the_same(versions: tuple[Scene, Clip, Clip]) -> None:
     scene, before, after = versions
     times = key_and_mid_times(before, after)[::9][:FRAMES]
