@@ -14,6 +14,7 @@ import pytest
 
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.loops import loop_analysis
+from anim.model import Clip, TimeAxis
 from fixtures.broken.pieces import buffered, text
 from tests.cli.conftest import Call
 from tests.cli.running import refusal, started
@@ -79,6 +80,25 @@ def test_equal_loops_are_analyzed_once(
     counted = _count_calls(monkeypatch, loop_analysis, "_judge")
     call("loop", tmp_path / "in.gltf", *(str(tmp_path / "out.glb") if each == "OUT" else each for each in options))
     assert len(counted) == 1
+
+
+def test_a_plot_takes_the_span_of_a_clip_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is a search over all tracks: for each of them it would be quadratic."""
+    pytest.importorskip("matplotlib")
+    channels = [{"sampler": 0, "target": {"node": i, "path": "rotation"}} for i in range(CLIPS)]
+    animation = {"name": "a", "samplers": SAMPLERS, "channels": channels}
+    nodes = [{"name": f"n{i}"} for i in range(CLIPS)]
+    (tmp_path / "in.gltf").write_bytes(text({"nodes": nodes, **KEYS, "animations": [animation]}))
+    counted: list[None] = []
+    time_axes = vars(Clip)["time_axes"].fget
+
+    def called(clip: Clip) -> tuple[TimeAxis, ...]:
+        counted.append(None)
+        return tuple(time_axes(clip))
+
+    monkeypatch.setattr(Clip, "time_axes", property(called))
+    call("plot", tmp_path / "in.gltf", tmp_path / "out.png").product()
+    assert len(counted) < 10
 
 
 def _count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[None]:
