@@ -7,7 +7,8 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import UnsupportedError
 from anim.exchange.euler.curve import evaluate
-from anim.exchange.euler.motion import EulerMotion, EulerNode
+from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
+from anim.maths.euler import AxesConvention
 
 DECIMALS = 6  # decimals of degrees and of the file's unit of length
 
@@ -18,6 +19,9 @@ def write(motion: EulerMotion) -> bytes:
     Moving nodes have six channels, others three; each node has its own order. Frames are the even grid of the first
     curve's times. Raises UnsupportedError without a grid, or for a node with extrinsic or pivoted angles.
     """
+    for node in motion.nodes:
+        if node.frame is AxesConvention.EXTRINSIC or node.pivots is not NO_PIVOTS:
+            raise UnsupportedError("a BVH has intrinsic angles and no pivots", where=f"node '{node.name}'")
     times = _frame_times(motion)
     lines = ["HIERARCHY"]
     children: dict[int, list[int]] = {}

@@ -11,7 +11,7 @@ import numpy as np
 from anim.errors import UnsupportedError
 from anim.exchange.euler.convention import axis_names
 from anim.exchange.euler.curve import HANDLES, Curve, Mode
-from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
+from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerMotion, EulerNode
 from anim.model.time_axis import merge_times
 
 KEY_COLUMNS = ("node", "channel", "time", "value")
@@ -24,10 +24,12 @@ Column = tuple[str, str, Curve]  # node, channel, its curve in the unit to write
 def write(motion: EulerMotion, convention: Convention) -> bytes:
     """Return the motion as CSV; the convention is that of its nodes, with the output unit.
 
-    Raises UnsupportedError for a node with another order: a CSV has one.
+    Raises UnsupportedError for a node with another order, or with pivots.
     """
     if any(node.order != convention.order for node in motion.nodes):
         raise UnsupportedError("a CSV has one order for all nodes", help="write .json or .bvh")
+    if any(node.pivots is not NO_PIVOTS for node in motion.nodes):
+        raise UnsupportedError("a CSV has no pivots", help="write .json")
     out = io.StringIO()
     out.write(f"# order={convention.order} frame={convention.frame} unit={convention.unit}\n")
     rows = csv.writer(out, lineterminator="\n")

@@ -51,7 +51,7 @@ from anim.exchange.euler.convention import (
 )
 from anim.exchange.euler.curve import HANDLES, MODES, WEIGHTS, Curve, Mode
 from anim.exchange.euler.motion import OFFSETS, Convention, EulerMotion, Pivots
-from anim.exchange.formats.json_writer import SCHEMA, write
+from anim.exchange.formats.json_writer import PIVOT_ROTATIONS, SCHEMA, write
 from anim.exchange.formats.node_builder import MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
 from anim.exchange.formats.text import MAX_NUMBER
 from anim.gltf.io import json_text
@@ -63,7 +63,6 @@ __all__ = ["read", "write"]
 
 CONVENTION_KEYS = ("order", "frame", "unit")
 FILE_KEYS = ("schema", *CONVENTION_KEYS, "meters_per_unit", "nodes")
-PIVOT_ROTATION_KEYS = ("pre_rotation", "post_rotation")
 NODE_KEYS = (
     "name",
     "parent",
@@ -71,7 +70,7 @@ NODE_KEYS = (
     "translation",
     "rotation",
     "scale",
-    *PIVOT_ROTATION_KEYS,
+    *PIVOT_ROTATIONS,
     *OFFSETS,
     "curves",
 )
@@ -131,7 +130,7 @@ def _node_builder(node: Any, said: PartialConvention, later: float, where: str) 
     draft.translation = _parse_array(node, "translation", (3,), np.zeros(3), where)
     draft.angles = _parse_array(node, "rotation", (3,), np.zeros(3), where)
     draft.scale = _parse_array(node, "scale", (3,), np.ones(3), where)
-    if any(key in node for key in (*OFFSETS, *PIVOT_ROTATION_KEYS)):
+    if any(key in node for key in (*OFFSETS, *PIVOT_ROTATIONS)):
         draft.pivots = _pivots(node, convention, where)
     curves = node.get("curves", {})
     if not isinstance(curves, dict):
@@ -149,7 +148,7 @@ def _node_builder(node: Any, said: PartialConvention, later: float, where: str) 
 
 def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivots:
     turns = {}
-    for key in PIVOT_ROTATION_KEYS:
+    for key in PIVOT_ROTATIONS:
         given = _parse_array(node, key, (3, 4), np.zeros(3), where)
         if len(given) == 4:
             if not given.any():

@@ -10,10 +10,11 @@ import numpy as np
 from anim.arrays import Floats
 from anim.exchange.euler.convention import axis_names
 from anim.exchange.euler.curve import HANDLES, Curve, Mode
-from anim.exchange.euler.motion import Convention, EulerMotion, EulerNode
+from anim.exchange.euler.motion import NO_PIVOTS, OFFSETS, Convention, EulerMotion, EulerNode, Pivots
 from anim.gltf.io import json_text
 
 SCHEMA = "euler-curves/1"
+PIVOT_ROTATIONS = ("pre_rotation", "post_rotation")
 MULTILINE_LIST = re.compile(rb"\[\n\s*([^][{}]*?)\s*\]")  # of numbers or strings
 
 
@@ -43,6 +44,8 @@ def _node_json(node: EulerNode, motion: EulerMotion, convention: Convention) -> 
     about["translation"] = _short(node.translation)
     about["rotation"] = _short(node.angles / convention.unit.radians)
     about["scale"] = _short(node.scale)
+    if node.pivots is not NO_PIVOTS:
+        about |= _pivots_json(node.pivots)
     curves: dict[str, Any] = {}
     for axis, curve in sorted(node.moves.items()):
         curves[f"translation.{'xyz'[axis]}"] = _curve_json(curve)
@@ -52,6 +55,10 @@ def _node_json(node: EulerNode, motion: EulerMotion, convention: Convention) -> 
     for axis, curve in sorted(node.scales.items()):
         curves[f"scale.{'xyz'[axis]}"] = _curve_json(curve)
     return {**about, "curves": curves} if curves else about
+
+
+def _pivots_json(pivots: Pivots) -> dict[str, Any]:
+    return {name: _short(getattr(pivots, name)) for name in (*PIVOT_ROTATIONS, *OFFSETS)}
 
 
 def _curve_json(curve: Curve) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from anim.arrays import Floats
 from anim.errors import AnimError, FormatError
 from anim.exchange.euler.convention import axis_index
 from anim.exchange.euler.curve import Curve
-from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerNode, Pivots
+from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerMotion, EulerNode, Pivots, scale_motion
 
 MAX_UNIT_M = 1e9  # m; limit of a file's unit of length
 KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
@@ -72,8 +72,8 @@ def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tupl
             if each.name not in numbers:
                 numbers[each.name] = len(ordered)
                 ordered.append(each)
-    nodes = tuple(_node(d, -1 if d.parent is None else numbers[d.parent], meters_per_unit) for d in ordered)
-    return nodes, any(node.parent >= 0 for node in nodes)
+    nodes = tuple(_node(d, -1 if d.parent is None else numbers[d.parent]) for d in ordered)
+    return scale_motion(EulerMotion(nodes), meters_per_unit).nodes, any(node.parent >= 0 for node in nodes)
 
 
 def check_nodes(draft: NodeBuilder, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
@@ -86,18 +86,17 @@ def check_nodes(draft: NodeBuilder, slot: tuple[str, int], build: Callable[[], C
         raise FormatError(error.problem, where=error.where, help=error.help) from None
 
 
-def _node(draft: NodeBuilder, parent: int, meters_per_unit: float) -> EulerNode:
+def _node(draft: NodeBuilder, parent: int) -> EulerNode:
     curves, convention = draft.curves, draft.convention
-    moves = {axis: curve.scaled(meters_per_unit) for (kind, axis), curve in curves.items() if kind == "translation"}
     return EulerNode(
         draft.name,
         parent,
-        draft.translation * meters_per_unit,
+        draft.translation,
         convention.order,
         convention.frame,
         draft.angles * convention.unit.radians,
         tuple(curves.get(("rotation", place)) for place in range(3)),
-        moves,
+        {axis: curve for (kind, axis), curve in curves.items() if kind == "translation"},
         draft.scale,
         {axis: curve for (kind, axis), curve in curves.items() if kind == "scale"},
         draft.pivots,

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json as plain_json
 from typing import Any
 
 import numpy as np
 import pytest
 
-from anim.errors import FormatError, RangeError
+from anim.errors import FormatError, RangeError, UnsupportedError
 from anim.exchange.euler.convention import UNSPECIFIED, PartialConvention
 from anim.exchange.euler.curve import Mode
-from anim.exchange.euler.motion import Convention, Unit
-from anim.exchange.formats import json_reader
+from anim.exchange.euler.evaluate import evaluate_translation
+from anim.exchange.euler.motion import OFFSETS, Convention, EulerMotion, Pivots, Unit
+from anim.exchange.formats import bvh_writer, csv_writer, json_reader
 from anim.maths import euler
 from anim.maths.euler import AxesConvention
 
@@ -71,6 +73,7 @@ def test_the_documented_schema_is_read() -> None:
     turned = euler.to_quaternion(np.radians((0, 0, 45.0)), order="XYZ", frame=AxesConvention.EXTRINSIC)
     np.testing.assert_allclose(arm.pivots.pre_rotation, turned)
     np.testing.assert_allclose(arm.pivots.post_rotation, (0, 0, 0, 1))
+    np.testing.assert_allclose(arm.pivots.rotation_pivot, (0.01, 0, 0))
     np.testing.assert_allclose(arm.rotation[1].out_tangents, np.radians((60, 0, 0)))
     np.testing.assert_allclose(arm.rotation[1].out_weights, (0.5, 0.25, 0.3))
     assert arm.rotation[1].in_weights is None
@@ -78,16 +81,39 @@ def test_the_documented_schema_is_read() -> None:
     np.testing.assert_allclose(arm.moves[2].values, (0, 0.05))
 
 
+@pytest.mark.parametrize("name", OFFSETS)
+def test_the_unit_of_length_applies_to_offsets_and_pivots(name: str) -> None:
+    arm = _read(_changed(f"nodes/0/{name}", [50, 0, -20])).nodes[1]
+    np.testing.assert_allclose(getattr(arm.pivots, name), (0.5, 0, -0.2))
+
+
+def test_a_pivot_in_centimetres_moves_its_node_by_metres() -> None:
+    z = {"times": [0, 1], "values": [0, 90]}
+    arm = {"name": "arm", "translation": [0, 100, 0], "rotation_pivot": [50, 0, 0], "curves": {"rotation.z": z}}
+    motion = _read({**CURVES, "nodes": [arm]})
+    np.testing.assert_allclose(evaluate_translation(motion.nodes[0], np.array([1.0])), [(0.5, 0.5, 0)], atol=1e-12)
+
+
+def test_other_formats_refuse_pivots() -> None:
+    motion = _read(CURVES)
+    convention = Convention("XYZ", AxesConvention.EXTRINSIC, Unit.DEG)
+    for nodes in (motion.nodes[1:], motion.nodes[:1]):
+        with pytest.raises(UnsupportedError, match="a BVH has intrinsic angles and no pivots"):
+            bvh_writer.write(EulerMotion(nodes))
+    with pytest.raises(UnsupportedError, match="a CSV has no pivots"):
+        csv_writer.write(EulerMotion(motion.nodes[1:]), convention)
+
+
 def test_what_is_written_is_read_as_the_same() -> None:
     content = _changed("nodes/1", {"name": "body"})
-    for key in ("pre_rotation", "post_rotation", "rotation_pivot"):
-        del content["nodes"][0][key]
     motion = _read(content)
     again = json_reader.read(
         json_reader.write(motion, Convention("XYZ", AxesConvention.EXTRINSIC, Unit.RAD)), UNSPECIFIED
     )
     one, two = motion.nodes[1], again.nodes[1]
     np.testing.assert_allclose(two.angles, one.angles)
+    for field in dataclasses.fields(Pivots):
+        np.testing.assert_allclose(getattr(two.pivots, field.name), getattr(one.pivots, field.name), atol=1e-9)
     for a, b in zip([*one.rotation[:2], one.moves[2]], [*two.rotation[:2], two.moves[2]], strict=True):
         assert a is not None
         assert b is not None
