@@ -26,7 +26,17 @@ def test_frames_at_the_keys_lose_nothing() -> None:
     assert to_bvh(skeleton([-1]), even, order="XYZ").notes == ()
 
 
-def test_step_tracks_and_one_frame_are_not_measured() -> None:
+def test_a_step_between_two_frames_is_late_but_not_lost() -> None:
     stepped = clip(track("rotation", [0, 0.3, 1], about("z", [0, 60, 10]), STEP))
-    assert frame_error(stepped, np.array([0, 0.5, 1])) == (0.0, 0.0)
+    assert frame_error(stepped, np.array([0, 0.5, 1]))[0] == pytest.approx(0, abs=1e-7)
     assert frame_error(stepped, np.array([0.0])) == (0.0, 0.0)
+    assert frame_error(stepped, np.array([0, 0.2])) == (0.0, 0.0)
+
+
+def test_a_step_that_ends_before_the_next_frame_is_lost() -> None:
+    stepped = clip(track("rotation", [0, 0.512, 0.52, 1], about("z", [0, 90, 10, 0]), STEP))
+    angle, time = frame_error(stepped, np.arange(31) / 30)
+    assert np.degrees(angle) == pytest.approx(80)
+    assert time == 0.512
+    (note,) = to_bvh(skeleton([-1]), stepped, order="XYZ", fps=30).notes
+    assert "up to 80° from the clip, at 0.512 s" in note
