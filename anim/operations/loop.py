@@ -16,6 +16,7 @@ from anim.sampling.derivatives import rates
 from anim.sampling.times import check_fps, distinct_float32, min_interval
 from anim.sampling.track import sample
 
+DURATION_TOLERANCE_FRACTION = 1e-6  # of the last key's time, of a blend as long as the clip: float32 and %g round
 MIN_BLEND_KEYS = 6  # fewest keys in a blend; sparser tracks get more
 BLEND_FPS = 30.0  # of the added keys
 MIN_INTERVAL_S = 1e-5  # s, between two keys; more where float32 resolves less
@@ -62,14 +63,14 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, fram
     vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks have their first value at
     the end of the clip. Tracks not in `tracks` keep their end, for example of a traveling root. frame_rate: of the keys
     added in the blend, from its start; None for even spacing.
-    Raises RangeError unless 0 < blend ≤ the clip's duration.
+    Raises RangeError unless 0 < blend ≤ the clip's duration, which is that of float32 keys: 1.3 s is 1.29999995 s.
     """
     chosen = track_indices(clip, tracks)
     check_number(blend, "blend")
-    if not 0 < blend <= clip.end - clip.start:
-        raise RangeError(
-            f"`blend` is {blend:g} s (expected more than 0, at most the clip's {clip.end - clip.start:g} s)"
-        )
+    duration = clip.end - clip.start
+    if not 0 < blend <= duration + DURATION_TOLERANCE_FRACTION * clip.end:
+        raise RangeError(f"`blend` is {blend:g} s (expected more than 0, at most the clip's {duration:g} s)")
+    blend = min(blend, duration)
     if frame_rate is not None:
         check_fps(frame_rate)
     closed = (_close(t, clip, blend, frame_rate) if i in chosen else t for i, t in enumerate(clip.tracks))

@@ -136,6 +136,20 @@ def test_blend_longer_than_the_clip_is_refused() -> None:
         loop(WALK, blend=1.5)
 
 
+@pytest.mark.parametrize("start", [0.0, 40.0])
+def test_a_blend_as_long_as_the_clip_is_taken_in_spite_of_float32(start: float) -> None:
+    times = np.array([0.0, 0.4, 1.3]) + start
+    moved = clip_of(
+        track("translation", times.astype(np.float32).astype(np.float64), [[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    )
+    assert moved.end - moved.start < 1.3
+    (new,) = loop(moved, blend=1.3).tracks
+    np.testing.assert_allclose(new.values[-1], new.values[0], atol=1e-12)
+    assert new.times[0] == moved.start
+    with pytest.raises(RangeError, match="`blend` is 1"):
+        loop(moved, blend=1.301)
+
+
 def test_the_best_part_of_two_walks_is_one_walk() -> None:
     twice = Clip("", tuple(Track(t.node, t.path, t.interpolation, _lap(t.times), _again(t)) for t in WALK.tracks))
     best = best_ranges(SKIN, twice, shortest=0.8)[0]
