@@ -56,6 +56,7 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
     births = emit(scene, clip, emitter, start, options.duration, options.seed, options.start)
     if not len(births):
         raise RangeError("no particle is emitted", help="raise the rate, the burst or the duration")
+    _check_speed(births)
     num_emitted = len(births)
     if options.loop:
         births = repeat_births(births, options.duration)
@@ -88,6 +89,18 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
         reduction=reduction,
     )
     return ParticleRun(nodes, keys, births, options, report)
+
+
+def _check_speed(births: Births) -> None:
+    """Raise RangeError for particles that no run allows at birth: the emitter's own speed, whatever the step."""
+    from anim.simulation.particles.kernels.particle_run import MAX_SPEED_M_S
+
+    speed = float(np.linalg.norm(births.velocities, axis=1).max())
+    if speed >= MAX_SPEED_M_S:
+        raise RangeError(
+            f"a particle is born at {speed:g} m/s, mostly the speed of its emitter (limit {MAX_SPEED_M_S:g} m/s)",
+            help="lower `inherit`: with 0 particles don't inherit the emitter's speed",
+        )
 
 
 def add_particles(

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anim.errors import RangeError
 from anim.model import Scene
 from anim.simulation.particles.emission import Births, Emitter, emit
+from anim.simulation.particles.options import ParticleOptions
+from anim.simulation.particles.simulate import simulate_particles
 from tests.clips import LINEAR, STEP, clip, skeleton, track
 
 
@@ -31,3 +34,14 @@ def test_a_jump_is_no_velocity(jump: float) -> None:
 def test_two_jumps_within_the_interval_are_no_velocity() -> None:
     found = births([0, 0.4996, 0.5004], [[0, 0, 0], [1, 0, 0], [2, 0, 0]], is_step=True)
     assert (found.velocities == 0).all()
+
+
+def test_an_emitter_faster_than_any_particle_is_refused_whatever_the_step() -> None:
+    played = clip(track("translation", [0, 1], np.array([[0.0, 0, 0], [2e5, 0, 0]])))
+    scene = Scene(skeleton([-1, 0]), ())
+    options = ParticleOptions(duration=0.1)
+    with pytest.raises(RangeError, match="a particle is born at 200000 m/s, mostly the speed of its emitter") as found:
+        simulate_particles(scene, played, Emitter((1,), rate=20, speed=1.0), options)
+    assert "lower `inherit`" in found.value.help
+    run = simulate_particles(scene, played, Emitter((1,), rate=20, speed=1.0, inherit=0.0), options)
+    assert len(run.births) == 2
