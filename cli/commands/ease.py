@@ -83,8 +83,8 @@ def command(
     the path changes. --per range eases the whole range from --from to --to once, through all its keys.
 
     Cubic easings (smoothstep, quad, cubic, back, bounce, hermite) are written exactly as CUBICSPLINE, others with as
-    few keys as --tolerance allows; steps() becomes STEP. STEP tracks stay unchanged. Easings that overshoot exceed the
-    values of the keys; the effect on scale and weights is reported.
+    few keys as --tolerance allows; steps() becomes STEP. STEP tracks keep their values; only --per range moves their
+    keys in time. Easings that overshoot exceed the values of the keys; the effect on scale and weights is reported.
 
     Easings are those of easings.net, but expo and elastic are scaled to be exactly 0 at the start and 1 at the end. The
     forms of easings.net, and of Penner, jump there: the difference is up to 0.001 of the key interval's change.
