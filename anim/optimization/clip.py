@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
+from anim.gltf.validation.channel_targets import is_shared_weights
 from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track
 from anim.optimization.options import Drop
 from anim.optimization.search.context import Context
@@ -80,7 +81,8 @@ class _TrackSorter:
     def _sort(self, i: int, track: Track) -> None:
         policy, exact = self._context.policy, self._context.bounds.max_error == 0
         if track.node is None or track.path == "pointer":
-            self._keep_track(i, key_reduction.reduce_pointer_keys(track, self._context.bounds.max_pointer_error))
+            bound = 0.0 if is_shared_weights(track.pointer or "") else self._context.bounds.max_pointer_error
+            self._keep_track(i, key_reduction.reduce_pointer_keys(track, bound))  # of weights: they move vertices
         elif self._is_invisible(i):
             self._dropped.append(i)
         elif track.path == "weights":

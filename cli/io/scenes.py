@@ -8,6 +8,7 @@ from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.reader import INSTANCING, instanced_nodes
+from anim.gltf.validation.channel_targets import weight_pointers
 from anim.model import Scene
 from anim.skinning.analysis.weight_sums import unnormalized_weights
 from cli.text import Reporter
@@ -23,7 +24,7 @@ def read_scene(
     tangents: bool = False,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
-    """Return the scene of a document; warn of normalized skin weights and ignored mesh copies.
+    """Return the scene of a document; warn of normalized skin weights, ignored mesh copies and ignored morph weights.
 
     name: of the file, for messages. normals, tangents: whether to read those too.
     nodes: gives the nodes of the command's meshes; None for all.
@@ -34,7 +35,18 @@ def read_scene(
         for words in bad.in_words():
             voice.warn(f"{name}: {words}")
     _warn_of_copies(document, name, voice, chosen)
+    _warn_of_weight_pointers(document, name, voice)
     return found
+
+
+def _warn_of_weight_pointers(document: Document, name: str, voice: Reporter) -> None:
+    pointers = weight_pointers(document.json)
+    if pointers:
+        more = f" and {len(pointers) - 1} more" if len(pointers) > 1 else ""
+        voice.warn(
+            f"{name}: morph weights by the pointer '{pointers[0]}'{more} are not evaluated: what they move is in no "
+            "figure, and in no bake"
+        )
 
 
 def _warn_of_copies(document: Document, name: str, voice: Reporter, chosen: Collection[int] | None) -> None:

@@ -22,6 +22,7 @@ from tests.cli.test_instancing import with_copies
 SUMS = "don't add up to 1"
 COPIES = "has copies of a mesh by EXT_mesh_gpu_instancing"
 JSON = ("--format", "json")
+WEIGHTS = "morph weights by the pointer '/nodes/1/weights/1' are not evaluated"
 REPORT = ("--report", "-", "--effort", "fast")
 WARNED = (  # command line, words of the warning, options that ask for the report; none where there is no report
     (("resample", "bad.glb", "out.glb", "--fps", "9"), SUMS, ()),
@@ -35,6 +36,10 @@ WARNED = (  # command line, words of the warning, options that ask for the repor
     (("resample", "copies.glb", "out.glb", "--fps", "9"), COPIES, ()),
     (("diff", "copies.glb", "copies.glb"), COPIES, JSON),
     (("optimize", "copies.glb", "out.glb", "--effort", "fast"), COPIES, REPORT),
+    (("resample", "pointer.glb", "out.glb", "--fps", "9"), WEIGHTS, ()),
+    (("bake", "pointer.glb", "out.npz", "--clip", "one_weight", "--fps", "4"), WEIGHTS, ()),
+    (("loop", "pointer.glb"), WEIGHTS, JSON),
+    (("optimize", "pointer.glb", "out.glb", "--effort", "fast"), WEIGHTS, REPORT),
     (("diff", "arm.glb", "biped.glb"), "no clip and no node has the same name", JSON),
     (("optimize", "arm.glb", "out.glb", "--max-error", "0.1", "--effort", "fast"), "0.1 means 0.1 m", REPORT),
     (
@@ -54,7 +59,7 @@ WARNED = (  # command line, words of the warning, options that ask for the repor
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> Path:
     """Files to warn of, in the current folder."""
     monkeypatch.chdir(tmp_path)
-    for name in ("arm", "biped", "tube"):
+    for name in ("arm", "biped", "tube", "pointer"):
         (tmp_path / f"{name}.glb").write_bytes(built(name))
     (tmp_path / "bad.glb").write_bytes(with_bad_sums(built("arm")))
     (tmp_path / "copies.glb").write_bytes(with_copies("arm"))

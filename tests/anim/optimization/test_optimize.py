@@ -11,6 +11,7 @@ import pytest
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
+from anim.gltf.writing import writer
 from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.measure.error.statistics import statistics
 from anim.model import Clip, Interpolation
@@ -211,6 +212,19 @@ def test_further_bounds() -> None:
                 assert about.angle.size <= angle
             else:
                 assert about.speed.size <= speed
+
+
+def test_morph_weights_by_pointers_keep_their_keys() -> None:
+    """They move vertices, which the bound of other pointers knows nothing of."""
+    document = opened_fixture("pointer")
+    clips = reader.clips(document)
+    number = next(i for i, each in enumerate(clips) if each.name == "one_weight")
+    times = np.arange(40) / 30
+    values = np.sin(times * 5)[:, None] * 0.5 + 0.5
+    track = clips[number].tracks[0].with_keys(times, values)
+    document = writer.replace_clips(document, {number: replace(clips[number], tracks=(track,))})
+    _, written = _optimized(document, replace(_request(document, 1e-2), bounds=Bounds(0.1, 0.1, max_pointer_error=0.1)))
+    np.testing.assert_array_equal(reader.clips(written)[number].tracks[0].values, values.astype(np.float32))
 
 
 def test_a_bound_that_no_storage_keeps_leaves_the_motion_as_it_is() -> None:
