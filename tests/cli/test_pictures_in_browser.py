@@ -65,6 +65,10 @@ def difference(a: Floats, b: Floats) -> float:
 def test_bakes_and_skinned_usd_look_as_their_source(
     call: Call, asset: Find, tmp_path: Path, name: str, clip: str, time: float
 ) -> None:
+    """But for what three.js leaves out of USD: blend shapes, both sides of faces, and points that move.
+
+    Blender shows all of it: tests/cli/test_in_blender.py.
+    """
     source, names = tmp_path / "source.glb", reader.names(opened_path(asset(name)))
     source.write_bytes(glb_of(without_losses(opened_path(asset(name)))))
     number = names.index(clip) if clip in names else 0

@@ -22,10 +22,14 @@ class PrimNames:
 
 
 def valid(name: str) -> str:
-    """Return a name with underscores for characters that identifiers of USD lack."""
+    """Return a name with underscores for characters that identifiers of USD lack, and before a first digit.
+
+    valid("left arm") → left_arm; valid("2H_Sword") → _2H_Sword
+    """
     from pxr import Tf
 
-    return str(Tf.MakeValidIdentifier(name.encode(errors="replace").decode()))
+    given = f"_{name}" if name[:1].isdecimal() else name  # which would be replaced
+    return str(Tf.MakeValidIdentifier(given.encode(errors="replace").decode()))
 
 
 def unique(name: str, taken: set[str]) -> str:
