@@ -6,6 +6,8 @@ OUT := demo-out
 FUZZ_SECONDS ?= 14400
 PAGE := anim/show/page/bundle/page.js
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Some images set it; pytest would compile all tests anew in each run.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test slow fuzz docs page blender format clean
 
@@ -13,11 +15,12 @@ demo: $(BIN)/.installed $(PAGE)
 	@$(BIN)/python -m fixtures $(OUT)/fixtures 2>/dev/null
 	@sh fixtures/demo.sh $(OUT)/fixtures/biped.glb $(OUT)
 
+# mypy uses one core only, so the tests run beside it.
 test: $(BIN)/.installed $(PAGE)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
+	$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"; tests=$$?; \
+	  wait $$types && exit $$tests
 
 # What takes minutes: real files under three bounds, judged by three.js. CI runs it too.
 slow: $(BIN)/.installed $(PAGE)

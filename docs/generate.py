@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from cli import main
+from cli.command_table import COMMANDS
 
 REFERENCE = Path(__file__).with_name("commands.md")
 HEADER = """# Commands
@@ -26,9 +27,9 @@ def reference() -> str:
     """
     group: Any = typer.main.get_command(main.app)
     context = group.make_context(main.PROGRAM, [], resilient_parsing=True)
-    rows = [f"| [{name}](#{name}) | {_escaped(info.about)} |" for name, info in main.COMMANDS.items()]
+    rows = [f"| [{name}](#{name}) | {_escaped(info.about)} |" for name, info in COMMANDS.items()]
     parts = [HEADER, "| command | |\n|---|---|", *rows, "", _paragraph(main.app.info.epilog)]
-    for name, row in main.COMMANDS.items():
+    for name, row in COMMANDS.items():
         command = group.get_command(context, name)
         parts += ["", *_section(name, command, row.examples, context)]
         for kind, info in getattr(command, "table", {}).items():

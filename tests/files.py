@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 import fixtures
 from anim.errors import FormatError
@@ -38,6 +40,12 @@ REAL = (
     "SimpleSkin.gltf",
     "vrm/test.vrma",
 )
+LARGE = ("BusterDrone/busterDrone.gltf", "Knight.glb", "Robot.glb")
+
+
+def mark_slow(values: Iterable[Any], slow: Container[Any] = LARGE) -> list[Any]:
+    """Return values for `parametrize`, of which the quick set leaves out those in `slow`."""
+    return [pytest.param(each, marks=pytest.mark.slow) if each in slow else each for each in values]
 
 
 def opened(data: bytes, files: Mapping[str, bytes] | None = None) -> Document:

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from cli.main import COMMANDS
+from cli.command_table import COMMANDS
 from docs.pages import run
 from tests.cli.running import ROOT, built
 from tests.pages import needs_page

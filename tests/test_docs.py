@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +16,7 @@ RENEW = "docs/ is not current: run `make docs`"
 NUMBER = re.compile(r"[-+−]?\d+(\.\d+)?(e[-+]?\d+)?")  # in another version of numpy the last digit may differ
 LINK = re.compile(r"(?<!!)\[[^\]]+\]\(([^)#:]+)\)")
 MAX_PICTURES_BYTES = 1_500_000
+SLOW_PAGES = ("examples", "recipes", "simulation")
 MAX_PAGE_LINES = 120
 
 
@@ -34,7 +37,13 @@ def test_the_reference_names_every_option() -> None:
         assert option in text
 
 
-@pytest.mark.parametrize("page", [pytest.param(page, id=page.stem) for page in pages.PAGES])
+def page_cases() -> Iterator[Any]:
+    """All pages; those whose commands take some seconds are left out of the quick set."""
+    for page in pages.PAGES:
+        yield pytest.param(page, id=page.stem, marks=[pytest.mark.slow] if page.stem in SLOW_PAGES else [])
+
+
+@pytest.mark.parametrize("page", list(page_cases()))
 def test_a_page_shows_what_its_commands_print_and_draw(page: Path, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     if "gltf-anim view" in text and missing():

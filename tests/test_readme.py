@@ -14,8 +14,13 @@ from tests.pages import missing as pages_missing
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = [command for block in re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL) for command in pages.commands(block)]
+BLOCKS = [pages.commands(block) for block in re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)]
+SLOW_BLOCKS = ("gltf-anim run", "gltf-anim optimize biped.glb exact.glb --max-error 0")  # a command of each
 PYTHON = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+
+
+def is_slow(block: list[str]) -> bool:
+    return any(command in SLOW_BLOCKS for command in block)
 
 
 @pytest.fixture(scope="module")
@@ -26,12 +31,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [command for block in BLOCKS if not is_slow(block) for command in block])
 def test_command_runs(command: str, folder: Path) -> None:
     if command.startswith("gltf-anim view") and pages_missing():
         pytest.skip(pages_missing())
     code, text = pages.run_here(command, folder)
     assert code == 0, text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", [block for block in BLOCKS if is_slow(block)])
+def test_slow_commands_run(block: list[str], tmp_path: Path) -> None:
+    """A block that needs no file that others write."""
+    pages.write_inputs(tmp_path)
+    for command in block:
+        code, text = pages.run_here(command, tmp_path)
+        assert code == 0, text
 
 
 @pytest.mark.parametrize("example", PYTHON)
@@ -49,7 +64,8 @@ def test_curve_examples_are_read(kind: str, folder: Path) -> None:
 
 
 def test_commands_are_found() -> None:
-    assert len(COMMANDS) >= 10
+    assert sum(map(len, BLOCKS)) >= 10
+    assert all(sum(slow in block for block in BLOCKS) == 1 for slow in SLOW_BLOCKS)
     assert PYTHON
 
 

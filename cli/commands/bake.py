@@ -9,34 +9,24 @@ from typing import Annotated
 
 import typer
 
-from anim.caches.transforms import statistics, up_axis
-from anim.caches.transforms import vertex_order as orders
+from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
-from anim.model import Clip, VertexCache
+from anim.model import Clip, Scene
 from anim.operations.selection import Selection
-from anim.skinning.analysis.inbetween_error import InbetweenError, InbetweenMetric
-from anim.skinning.analysis.method_deviation import Deviation, MeasuredBake, linear_baker
-from anim.skinning.bake import SPACES, Baker, bakeable_instances
-from anim.skinning.uneven import UnevenScale
-from cli import text, units
+from anim.skinning.bake import SPACES, bakeable_instances
+from cli import text
 from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
 from cli.options import caches, common, meshes
 from cli.options.meshes import ABOUT, Method
-from cli.progress import Progress, announce_compiling
+from cli.progress import announce_compiling
 from cli.reports import bake_notes
-from cli.reports.bake_report import BakedFile, report_notes, report_written, summarize_files
+from cli.reports.bake_report import report_notes, summarize_files
 from cli.reports.rotation_notes import normalized_keys_note
 from cli.text import Reporter
-from cli.workflows.bake_clip import (
-    BakeOptions,
-    Output,
-    default_directions,
-    keeps_materials,
-    keeps_nodes,
-    source_options,
-)
+from cli.workflows.bake_clip import BakeOptions, default_directions, keeps_materials, keeps_nodes
 from cli.workflows.bake_jobs import PLACEHOLDERS, bake_jobs, mesh_groups
+from cli.workflows.bake_run import BakeRun, FileOptions
 from cli.workflows.cache_page import check_cache_page, write_cache_page
 
 LBS = Method("lbs")
@@ -124,7 +114,7 @@ def command(
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     ending = cache_files.check(output, None if format is None else f".{format}", PLACEHOLDERS)
-    given = {
+    values = {
         "quantize": quantize,
         "layout": layout,
         "preset": preset,
@@ -132,31 +122,20 @@ def command(
         "rest_mesh": rest_mesh,
         "max_targets": max_targets,
     }
-    # Raises before any work for options that the format doesn't support.
-    caches.write_options(ending, given | {"max_error": max_error})
-    caches.check_supported(ending, normals=bool(normals), tangents=bool(tangents))
-    if keep_skeleton and not keeps_nodes(ending):
-        raise UsageError(f"--keep-skeleton does not apply to {ending}")
+    files = FileOptions(ending, values, max_error, up, vertex_order, keep_skeleton, dry_run)
+    files.check(normals=bool(normals), tangents=bool(tangents))
     moved = {"--space mesh": space is not WORLD, "--up": up is not None, "--vertex-order": vertex_order is not None}
     check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
-    done: list[BakedFile] = []
     with documents.source(input, voice) as source:
         document = source.document
         clips = reader.clips(document)
-        scene = scenes.read_scene(
-            document,
-            source.name,
-            voice,
-            normals=bool(normals or tangents) or (normals is None and keeps_materials(ending)),
-            tangents=bool(tangents) or (normals is not False and tangents is None and keeps_materials(ending)),
-            nodes=lambda scene: meshes.nodes(scene, mesh),
-        )
-        numbers = Selection(clip or ()).chosen_clips(reader.names(document))
+        scene = _read_scene(source, mesh, ending, voice, normals=normals, tangents=tangents)
+        clip_indices = Selection(clip or ()).chosen_clips(reader.names(document))
         nodes = meshes.nodes(scene, mesh)
-        chosen = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
-        scenes.warn_of_other_scenes(document, source.name, voice, chosen)
+        baked_nodes = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
+        scenes.warn_of_other_scenes(document, source.name, voice, baked_nodes)
         groups = mesh_groups(scene, nodes, output, rigid=rigid)
-        jobs = bake_jobs(output, ending, groups, [(clips[i].name, i) for i in numbers])
+        jobs = bake_jobs(output, ending, groups, [(clips[i].name, i) for i in clip_indices])
         if html is not None and len(jobs) > 1:
             raise UsageError(f"--html shows one clip and one file, not {len(jobs)} (choose with --clip)")
         lit, mapped = default_directions(document, scene, nodes, ending, rigid=rigid)
@@ -165,77 +144,42 @@ def command(
         options = BakeOptions(method.value, blend, bulge_clamp, space.value, normals, tangents, rigid, fps, start, end)
         announce_compiling(voice)
         bake_notes.clamped_range_note(
-            [(reader.clip_label(clips[i].name, i), clips[i]) for i in numbers], start, end, voice
+            [(reader.clip_label(clips[i].name, i), clips[i]) for i in clip_indices], start, end, voice
         )
         if not rigid and not keeps_nodes(ending) and bakeable_instances(scene, nodes=nodes):
             bake_notes.left_out_note(scene, nodes, voice)
-        missed: list[tuple[str, InbetweenError]] = []
-        made: dict[int, Baker] = {}
-        metrics: dict[int, InbetweenMetric] = {}
-        linear: Baker | None = None
-        scales: UnevenScale | None = None
-        deviations: list[tuple[str, Deviation]] = []
-        uneven: set[int] = set()
+        run = BakeRun(source, scene, options, files, voice)
         for job in jobs:
-            if job.group not in made:
-                made = {job.group: options.baker(scene, groups[job.group][1])}
-                metrics = {job.group: InbetweenMetric(made[job.group])}
-                if method is not LBS:
-                    linear = linear_baker(made[job.group], space=space.value)
-                    scales = UnevenScale(made[job.group])
-            each = Clip("", ()) if job.clip is None else clips[job.clip]
-            times, label = options.times(each), reader.clip_label(each.name, job.clip or 0)
-            if scales is not None:
-                uneven.update(scales.joints(each, times))
-            missed.append((label, metrics[job.group].largest_error(each, times)))
-            progress = Progress(PurePath(job.file).name, len(times), shown=not quiet)
-            measured = None if linear is None else MeasuredBake(made[job.group], linear, each, times, progress)
-            baked = made[job.group].bake(each, times=times, progress=progress) if measured is None else measured.cache
-            cache = _turned(baked, up, vertex_order)
-            looks = source_options(
-                source,
-                options,
-                scene,
-                groups[job.group][1],
-                (job.clip, each),
-                keep_skeleton=keep_skeleton,
-                output=Output(job.file, ending, dry_run),
-            )
-            try:
-                meters = _meters(max_error, cache)
-                writing = caches.write_options(ending, given | {"max_error": meters, **looks})
-                saved = cache_files.save(cache, job.file, writing, ending=ending, dry_run=dry_run)
-            except BaseException:
-                report_written(done, voice, dry_run=dry_run)
-                raise
-            finally:
-                progress.close()
-            if measured is not None:
-                deviations.append((label, measured.deviation()))
-            done.append(BakedFile(job.file, each.name, job.clip, job.group, len(times), cache.vertex_count, saved))
+            run.bake(job, groups[job.group][1], Clip("", ()) if job.clip is None else clips[job.clip])
             if len(jobs) > 1:
-                voice.verbose_info(f"  {summarize_files(done[-1:], method.value)}")
-        at_rest = made[jobs[-1].group].rest
-    report_notes(done, voice)
+                voice.verbose_info(f"  {summarize_files(run.files[-1:], method.value)}")
+    report_notes(run.files, voice)
     normalized_keys_note({job.clip: clips[job.clip] for job in jobs if job.clip is not None}, voice)
-    bake_notes.frame_gap_note(missed, at_rest, voice, is_chosen=fps is not None)
-    bake_notes.lost_data_notes(deviations, method.value, voice)
-    bake_notes.uneven_scale_note(sorted(uneven), scene, method.value, voice)
+    run.report_findings()
     took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
-    voice.info(f"{summarize_files(done, method.value)}, {took}")
+    voice.info(f"{summarize_files(run.files, method.value)}, {took}")
     if html is not None and not dry_run:
-        played = [] if jobs[0].clip is None else [f"#{jobs[0].clip}"]
-        written = str(PurePath(done[0].file).with_name(done[0].saved.files[-1]))
-        write_cache_page(html, input, written, played, voice)
+        (baked,) = run.files
+        path = str(PurePath(baked.file).with_name(baked.saved.files[-1]))
+        write_cache_page(html, input, path, [] if baked.number is None else [f"#{baked.number}"], voice)
 
 
-def _turned(cache: VertexCache, up: str | None, order: str | None) -> VertexCache:
-    if order is not None:
-        cache = orders.reorder(cache, str(order))
-    return cache if up is None else up_axis.to_up_axis(cache, str(up))
-
-
-def _meters(max_error: str | None, cache: VertexCache) -> float | None:
-    return (
-        None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
+def _read_scene(
+    source: Source,
+    mesh: list[str] | None,
+    ending: str,
+    voice: Reporter,
+    *,
+    normals: bool | None,
+    tangents: bool | None,
+) -> Scene:
+    """Return the scene with the normals and tangents that may be baked; None: by default of the format."""
+    by_default = keeps_materials(ending)
+    return scenes.read_scene(
+        source.document,
+        source.name,
+        voice,
+        normals=bool(normals or tangents) or (normals is None and by_default),
+        tangents=bool(tangents) or (normals is not False and tangents is None and by_default),
+        nodes=lambda scene: meshes.nodes(scene, mesh),
     )

@@ -14,7 +14,7 @@ import typer
 from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS, READABLE
 from anim.caches.transforms import resample, statistics, up_axis
-from anim.caches.transforms import vertex_order as orders
+from anim.caches.transforms.vertex_order import reorder
 from anim.model import FrameChunk, VertexCache
 from cli import text, units
 from cli.errors import UsageError
@@ -158,7 +158,7 @@ def _changed(
     if fps is not None:
         cache = resample.at_rate(cache, fps)
     if chosen is not None:
-        cache = orders.reorder(cache, str(chosen))
+        cache = reorder(cache, str(chosen))
     return cache if up is None else up_axis.to_up_axis(cache, str(up))
 
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from anim.gltf.io import container
 from anim.measure.error.surface import is_measured_at
+from anim.model import Scene
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, PLAYERS, Drop, Objective, Packing, Policy, Reference, Request
-from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, curve
 from cli.errors import UsageError
 from cli.io import documents
 from cli.io.page_output import check_page, page_file, write_page
@@ -29,8 +28,7 @@ from cli.workflows import many_files, optimize_job
 from cli.workflows.edit_clips import note_images
 from cli.workflows.optimize_job import OptimizeJob
 from cli.workflows.page_comparison import compare_files, worst_view
-
-PICTURES = (".png", ".svg")
+from cli.workflows.rate_curve import check_curve_file, write_curve
 
 
 class Meshopt(StrEnum):
@@ -171,71 +169,90 @@ def command(
     """
     voice = Reporter(quiet, verbose)
     max_count = None if max_bytes is None else optimize_job.count_of_bytes(max_bytes)
-    if curve_file is not None and (max_bytes is not None or report is not None):
-        raise UsageError("--curve goes with neither --max-bytes nor --report")
-    if out is not None and (report is not None or curve_file is not None):
-        raise UsageError(f"--{'curve' if report is None else 'report'} is about one file: leave out --out")
+    outputs = _Outputs(report, html, curve_file, dry_run)
+    outputs.check_options(out=out, max_bytes=max_bytes)
+    lengths = {
+        "max_error": optimize_job.DEFAULT_MAX_ERROR if max_error is None else max_error,
+        "shell": shell,
+        "max_pointer_error": max_pointer_error,
+        "max_angle": max_angle,
+        "max_speed_error": max_speed_error,
+    }
 
-    if html is not None:
-        check_page(html, "--html")
-        if out is not None or curve_file is not None:
-            raise UsageError(f"--html goes with neither --{'out' if curve_file is None else 'curve'}")
+    def request(scene: Scene) -> Request:
+        bounds = optimize_job.bounds(scene, lengths)
+        for words in optimize_job.notes(lengths):
+            voice.warn(words)
+        nodes = optimize_job.nodes_to_keep(keep_node or (), scene)
+        return Request(
+            bounds,
+            Policy(drop, reference, rebase_rest, drop_invisible, nodes),
+            Packing.CORE if meshopt is None else Packing(meshopt.value),
+            objective,
+            str(effort),
+            PLAYERS if player is Player.ANY else ("spec",),
+            optimize_job.raw_options(bounds, lengths),
+        )
 
     def edit(input: str, output: str) -> None:
         began = time.perf_counter()
-        _check_outputs(input, output, report, curve_file, dry_run=dry_run)
+        outputs.check_paths(input, output)
         with documents.source(input, voice) as source:
             work = optimize_job.optimize_job(
                 source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
             )
-            said = {
-                "max_error": optimize_job.DEFAULT_MAX_ERROR if max_error is None else max_error,
-                "shell": shell,
-                "max_pointer_error": max_pointer_error,
-                "max_angle": max_angle,
-                "max_speed_error": max_speed_error,
-            }
-            bounds = optimize_job.bounds(work.scene, said)
-            for words in optimize_job.notes(said):
-                voice.warn(words)
-            request = Request(
-                bounds,
-                Policy(
-                    drop,
-                    reference,
-                    rebase_rest,
-                    drop_invisible,
-                    optimize_job.nodes_to_keep(keep_node or (), work.scene),
-                ),
-                Packing.CORE if meshopt is None else Packing(meshopt.value),
-                objective,
-                str(effort),
-                PLAYERS if player is Player.ANY else ("spec",),
-                optimize_job.raw_options(bounds, said),
-            )
+            wanted = request(work.scene)
             if curve_file is not None:
-                _draw_curve(work, request, curve_file, voice, dry_run=dry_run)
+                write_curve(work, wanted, curve_file, voice, dry_run=dry_run)
                 return
             if max_count is None:
-                found = work.run(request)
+                found = work.run(wanted)
             else:
-                ceiling = None if max_error is None else request.bounds.max_error
-                request, found = work.fitted(request, max_count, ceiling=ceiling)
-            optimize_report.check(found, work.clips, request, work.scale)
-            about = _about(work, request, found, began)
+                ceiling = None if max_error is None else wanted.bounds.max_error
+                wanted, found = work.fitted(wanted, max_count, ceiling=ceiling)
+            optimize_report.check(found, work.clips, wanted, work.scale)
+            about = _about(work, wanted, found, began)
             with _report(about, voice, report, dry_run=dry_run):
                 documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
         _report_result(about, voice, dry_run=dry_run)
-        if html is not None and not dry_run:
-            before = page_file(input, about.before, source.size)
-            after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
-            content = compare_files(before, after, voice)
-            view = worst_view(before, content)
-            write_page(html, before, after, voice, content=content, panels=size_panels(about), view=view)
         if not dry_run:
+            if html is not None:
+                _write_comparison(html, input, about, voice)
             note_images(about.after, source, output, voice)
 
     return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+
+
+@dataclass(frozen=True, slots=True)
+class _Outputs:
+    """Files beside the model, None for those not asked for."""
+
+    report: str | None
+    html: str | None
+    curve: str | None
+    dry_run: bool
+
+    def check_options(self, *, out: str | None, max_bytes: str | None) -> None:
+        """Raise UsageError for options that exclude each other."""
+        if self.curve is not None and (max_bytes is not None or self.report is not None):
+            raise UsageError("--curve goes with neither --max-bytes nor --report")
+        if out is not None and (self.report is not None or self.curve is not None):
+            raise UsageError(f"--{'curve' if self.report is None else 'report'} is about one file: leave out --out")
+        if self.html is not None:
+            check_page(self.html, "--html")
+            if out is not None or self.curve is not None:
+                raise UsageError(f"--html goes with neither --{'out' if self.curve is None else 'curve'}")
+
+    def check_paths(self, input: str, output: str) -> None:
+        """Raise before any work for outputs that can't be written or are another file of the command."""
+        if self.curve is not None:
+            check_curve_file(self.curve)
+        elif not self.dry_run:
+            documents.check_output(output)
+        if self.report is not None and self.report != documents.PIPE:
+            _check_report(self.report, input, output)
+        if self.report == output == documents.PIPE and self.curve is None and not self.dry_run:
+            raise UsageError("--report and OUT can't both be stdout")
 
 
 def _about(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:
@@ -274,20 +291,6 @@ def _report_result(about: optimize_report.OptimizeReport, voice: Reporter, *, dr
         voice.verbose_info(line)
 
 
-def _check_outputs(input: str, output: str, report: str | None, curve_file: str | None, *, dry_run: bool) -> None:
-    """Raise before any work for outputs that can't be written or are another file of the command."""
-    if curve_file is not None:
-        documents.check_file(curve_file)
-        if PurePath(curve_file).suffix.lower() not in (".csv", *PICTURES):
-            raise UsageError(f"{curve_file}: is no .csv, .png or .svg file")
-    elif not dry_run:
-        documents.check_output(output)
-    if report is not None and report != documents.PIPE:
-        _check_report(report, input, output)
-    if report == output == documents.PIPE and curve_file is None and not dry_run:
-        raise UsageError("--report and OUT can't both be stdout")
-
-
 def _check_report(report: str, input: str, output: str) -> None:
     """Raise UsageError for a report path that is a model's."""
     documents.check_file(report)
@@ -297,20 +300,10 @@ def _check_report(report: str, input: str, output: str) -> None:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
 
-def _draw_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
-    sizes = []
-    bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
-    for sized in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
-        voice.info(optimize_report.curve_line(sized, work.scale))
-        sizes.append(sized)
-    if dry_run:
-        return
-    kind = PurePath(path).suffix.lower()[1:]
-    if kind == "csv":
-        documents.write_text(optimize_report.curve_csv(sizes, work.scale), path)
-    else:
-        from anim.show.plots.rate_distortion_plot import rate_distortion_plot as picture
-
-        title, source = PurePath(work.source.name).name, optimize_report.cost(work.source.document)
-        drawn = picture(sizes, work.scale, title=title, kind=kind, source=source)
-        documents.write_bytes([np.frombuffer(drawn, np.uint8)], path)
+def _write_comparison(html: str, input: str, about: optimize_report.OptimizeReport, voice: Reporter) -> None:
+    """Write the page that compares the model before and after."""
+    before = page_file(input, about.before, about.size_before)
+    after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
+    content = compare_files(before, after, voice)
+    view = worst_view(before, content)
+    write_page(html, before, after, voice, content=content, panels=size_panels(about), view=view)

@@ -14,13 +14,12 @@ from anim.curves.easing.table import parse
 from anim.errors import DataRangeError, NotFoundError
 from anim.maths.euler import check_order
 from anim.operations.selection import Selection
-from anim.show.plots import track_plot as tracks
 from anim.show.plots.easing_plot import easing_plot
 from anim.show.plots.rotations import COMPONENTS, FROM_REST
 from anim.show.plots.stability_plot import stability_plot
-from anim.show.plots.tangent_plot import tangent_plot as curves_through
-from anim.show.plots.track_selection import TrackSelection, select_tracks
-from anim.show.plots.track_selection import compare as compared
+from anim.show.plots.tangent_plot import tangent_plot
+from anim.show.plots.track_plot import LIMIT, Names, track_plot
+from anim.show.plots.track_selection import TrackSelection, compare_selection, select_tracks
 from anim.simulation.comparison import Comparison, compare_integrators
 from anim.simulation.mass_spring import oscillator
 from cli.errors import UsageError
@@ -103,7 +102,7 @@ def command(
     components: Annotated[
         bool, typer.Option("--components", help="Rotations as quaternion components x, y, z, w, with tangent handles.")
     ] = False,
-    limit: Annotated[int, typer.Option("--limit", metavar="N", help="Maximum number of tracks.")] = tracks.LIMIT,
+    limit: Annotated[int, typer.Option("--limit", metavar="N", help="Maximum number of tracks.")] = LIMIT,
     clip: common.Clips = None,
     node: common.Nodes = None,
     path: common.Paths = None,
@@ -161,7 +160,7 @@ def command(
         picture = _oscillator(20.0 if omega is None else omega, step or "1/60", kind)
     elif through is not None:
         times, values = _keys(through)
-        picture = curves_through(times, values, tangents or ["catmull-rom"], kind=kind)
+        picture = tangent_plot(times, values, tangents or ["catmull-rom"], kind=kind)
     else:
         picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
     if shown is not None:
@@ -240,15 +239,15 @@ def _tracks(
             raise error.advise("gltf-anim inspect IN --tracks lists them") from None
     if other is not None:
         with documents.source(other, voice) as opened:
-            chosen, alone = compared(chosen, opened.document)
-        names = tracks.Names(PurePath(name).name, PurePath(opened.name).name)
+            chosen, alone = compare_selection(chosen, opened.document)
+        names = Names(PurePath(name).name, PurePath(opened.name).name)
         if alone:
             voice.info(f"note: {plural(alone, 'track')} of {name} {'is' if alone == 1 else 'are'} not in {opened.name}")
     _report_left_out(chosen, voice)
     title = PurePath(name).stem
     clips = {each.clip for each in chosen.shown}
     title = f"{title}: {clips.pop()}" if len(clips) == 1 else title
-    return tracks.track_plot(chosen.shown, title=title, kind=kind, names=names, note=_count(chosen))
+    return track_plot(chosen.shown, title=title, kind=kind, names=names, note=_count(chosen))
 
 
 def _count(chosen: TrackSelection) -> str:

@@ -1,9 +1,7 @@
-"""Text report of `optimize`, and the points of its rate-distortion curve."""
+"""Text report of `optimize`."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -16,7 +14,6 @@ from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Drop, Request
-from anim.optimization.rate_distortion import RatePoint
 from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from anim.optimization.writing import KEY
@@ -149,29 +146,6 @@ def _clip_line(about: OptimizeReport, number: int, solution: Solution) -> str:
     usual = optimize_bound.of_clip(found, about.request) + usual
     moved = found.error.max_error > FLOAT_NOISE * about.scale
     return f"  {reader.clip_label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
-
-
-def curve_line(sized: RatePoint, scale: float) -> str:
-    """Return one point of the curve as text."""
-    percent = 100 * sized.max_error / scale if scale else 0.0
-    bound = f"{format_length(sized.max_error)} ({format_number(percent, 2)} %)" if sized.max_error else "without loss"
-    sizes = f"animation {format_bytes(sized.animation)}, file {format_bytes(sized.size)}"
-    return f"  {bound}: {sizes}, max {format_length(sized.error)}"
-
-
-def curve_csv(sizes: Sequence[RatePoint], scale: float) -> str:
-    """Return the curve as CSV.
-
-    Columns: bound in metres and as a fraction of the diagonal, bytes of the file, largest measured error, and bytes of
-    the animation alone.
-    """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m", "animation_bytes"])
-    for each in sizes:
-        share = each.max_error / scale if scale else 0.0
-        writer.writerow([each.max_error, share, each.size, each.error, each.animation])
-    return text.getvalue()
 
 
 def cost(document: Document) -> int:

@@ -30,6 +30,14 @@ def write_crowd(folder: Path, **files: str) -> None:
         (folder / "crowd" / f"{name}.glb").write_bytes(built(fixture))
 
 
+def write_long_run(folder: Path, count: int) -> None:
+    """Write files with work for some seconds, and their recipe."""
+    (folder / "crowd").mkdir()
+    for index in range(count):
+        (folder / f"crowd/{index:02}.glb").write_bytes(variant(built("biped"), index))
+    write_recipe(folder, "resample --fps 60", "spline")
+
+
 def variant(data: bytes, number: int) -> bytes:
     """The GLB with other content of the same motion."""
     document, blob = split(data)

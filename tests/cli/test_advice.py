@@ -161,9 +161,13 @@ ASSETS = (
     "InterpolationTest.gltf",
     "MorphStressTest.glb",
     "RiggedSimple.gltf",
-    "AnimationPointer/24_animation_pointer.gltf",
 )
-LARGE = ("BusterDrone/busterDrone.gltf", "Knight.glb", "Robot.glb")  # half a minute each
+LARGE = (
+    "AnimationPointer/24_animation_pointer.gltf",
+    "BusterDrone/busterDrone.gltf",
+    "Knight.glb",
+    "Robot.glb",
+)  # half a minute each
 
 
 @pytest.mark.parametrize("name", [*ASSETS, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)])

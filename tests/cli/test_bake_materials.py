@@ -27,7 +27,7 @@ from tests.textured import UNKNOWN, looks, textured
 ASSETS = [
     ("Fox.glb", "Survey"),
     ("CesiumMan.glb", "#0"),
-    ("Knight.glb", "Cheer"),
+    pytest.param("Knight.glb", "Cheer", marks=pytest.mark.slow),
     ("BitmojiRun.glb", "lbr_run_normal_anm_default"),
 ]
 FLOAT_ERROR_PER_DIAGONAL = 1e-6  # of sums of targets, which players compute in float32

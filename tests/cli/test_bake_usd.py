@@ -23,7 +23,7 @@ pytest.importorskip("pxr", reason="usd-core is not installed")
 ASSETS = [
     ("Fox.glb", "Survey"),
     ("CesiumMan.glb", "#0"),
-    ("Knight.glb", "Cheer"),
+    pytest.param("Knight.glb", "Cheer", marks=pytest.mark.slow),
     ("BitmojiRun.glb", "lbr_run_normal_anm_default"),
 ]
 

@@ -23,7 +23,6 @@ from tests.files import ASSETS, glb_of, opened_path
 from tests.khronos import needs_validator, validate_many
 
 QUICK = (
-    "AnimationPointer/24_animation_pointer.gltf",
     "BitmojiRun.glb",
     "BoxAnimated.gltf",
     "CesiumMan.glb",
@@ -38,7 +37,7 @@ QUICK = (
     "vrm/Godette.vrm",
     "vrm/test.vrma",
 )
-LARGE = ("BusterDrone/busterDrone.gltf", "Knight.glb", "Robot.glb")
+LARGE = ("AnimationPointer/24_animation_pointer.gltf", "BusterDrone/busterDrone.gltf", "Knight.glb", "Robot.glb")
 DEFAULT = RuleSelection()
 EVERYTHING = RuleSelection(select=("ALL",), ignore=("GA109", "GA111"))  # whose fixes yield to that of GA102
 NAMES = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)]

@@ -17,7 +17,7 @@ from tests import khronos
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import built, help_line, refusal
 from tests.cli.untouched import around
-from tests.files import ASSETS, REAL, opened_path
+from tests.files import ASSETS, REAL, mark_slow, opened_path
 from tests.fixtures.reading import split
 
 Json = dict[str, Any]
@@ -58,7 +58,7 @@ def test_text_there_and_back_is_the_same_document(name: str, call: Call, fixture
     assert buffer == fixtures.COMPANIONS["gltf_external"]()["walk data.bin"]
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_real_files_there_and_back_are_the_same(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
     source = asset(name)
     ways = [tmp_path / "one.glb", tmp_path / "two.gltf", tmp_path / "three.glb"]

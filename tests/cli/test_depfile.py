@@ -14,6 +14,7 @@ import pytest
 import typer
 
 from cli import main
+from cli.command_table import COMMANDS
 from cli.commands import simulate
 from cli.io import depfile
 from tests.cli.conftest import Call, Find
@@ -91,7 +92,7 @@ def test_none_is_written_without_an_output(folder: Path, call: Call) -> None:
 def commands() -> Iterator[tuple[str, Any]]:
     """All commands, and the kinds of simulation, by name."""
     group: Any = typer.main.get_command(main.app)
-    for name in main.COMMANDS:
+    for name in COMMANDS:
         yield name, group.get_command(None, name)
     kinds: Any = group.get_command(None, "simulate")
     for kind in simulate.Group.table:

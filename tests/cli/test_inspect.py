@@ -19,7 +19,7 @@ from tests.cli.inspecting import Json, by_name, only
 from tests.cli.playing import Player
 from tests.cli.running import built
 from tests.clips import track
-from tests.files import REAL, glb_of, opened
+from tests.files import REAL, glb_of, mark_slow, opened
 from tests.fixtures.reading import decode, split
 
 
@@ -238,7 +238,7 @@ def test_what_does_not_concern_the_animation_is_a_finding(name: str, finding: st
     assert finding in names_of_findings(only(call, fixtures.BROKEN[name].data))
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_real_files_give_finite_numbers(name: str, call: Call, asset: Find) -> None:
     path = asset(name)
     facts = only(call, path, "--tracks")

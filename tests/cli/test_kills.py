@@ -133,8 +133,11 @@ def sequence(folder: Path) -> list[str]:
 @pytest.mark.parametrize("how", HOWS)
 @pytest.mark.parametrize(
     ("case", "first"),
-    [(pc2, "c.pc2"), (texture, "c.png"), (sequence, "c_00001.ply")],
-    ids=["pc2", "texture", "sequence"],
+    [
+        pytest.param(pc2, "c.pc2", id="pc2"),
+        pytest.param(texture, "c.png", id="texture"),
+        pytest.param(sequence, "c_00001.ply", id="sequence", marks=SLOW),
+    ],
 )
 def test_a_cache_and_its_companions_are_one_set_or_lack_the_main_file(
     how: str, case: Callable[[Path], list[str]], first: str, walk: Path, tmp_path: Path
@@ -158,9 +161,9 @@ def test_a_cache_and_its_companions_are_one_set_or_lack_the_main_file(
         check_leftovers(how, folder)
 
 
-@pytest.mark.parametrize("count", [6, pytest.param(60, marks=SLOW)])
-def test_random_kills_leave_whole_pairs(count: int, call: Call, walk: Path, tmp_path: Path) -> None:
-    chosen = random.Random(count)
+@SLOW
+def test_random_kills_leave_whole_pairs(call: Call, walk: Path, tmp_path: Path) -> None:
+    chosen, count = random.Random(60), 60
     call("convert", walk, tmp_path / "a.gltf", "-q").product()
     rates = [str(5 + i) for i in range(count)]
     seen = set()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -84,8 +85,19 @@ ODD = {
 }
 
 
-@pytest.mark.parametrize("line", LINES)
-@pytest.mark.parametrize("name", ODD)
+# Those of many keys, or with a text of 100 000 letters to draw.
+SLOW = ("27 hours-resample", "27 hours-spline", "27 hours-sample", "long names-plot")
+
+
+def odd_clips() -> Iterator[Any]:
+    """Every odd clip with every line."""
+    for name in ODD:
+        for line in LINES:
+            slow = f"{name}-{line.split()[0]}" in SLOW
+            yield pytest.param(name, line, id=f"{name}-{line}", marks=[pytest.mark.slow] if slow else [])
+
+
+@pytest.mark.parametrize(("name", "line"), list(odd_clips()))
 @pytest.mark.filterwarnings("ignore:Attempting to set identical")  # of matplotlib, which `main` hides
 def test_odd_clips_are_refused_or_done(name: str, line: str, call: Call, tmp_path: Path) -> None:
     path = tmp_path / "a.gltf"
@@ -189,7 +201,9 @@ def test_many_keys_are_counted_before_they_are_computed(
     assert words in refusal(run(line, walk, call), code)
 
 
-@pytest.mark.parametrize("locale", [{}, {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}])
+@pytest.mark.parametrize(
+    "locale", [pytest.param({}, marks=pytest.mark.slow), {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
+)
 def test_names_beyond_ascii_in_an_ascii_locale(locale: dict[str, str], tmp_path: Path) -> None:
     document = animated()
     document["nodes"][0]["name"] = "Hüfte★"
@@ -214,6 +228,7 @@ def test_a_full_disk_takes_no_help(option: str, tmp_path: Path) -> None:
     assert "stdout: can't be written (no space left on device)" in refusal(done, 3)
 
 
+@pytest.mark.slow
 def test_angles_of_many_thousand_turns_are_refused(call: Call, tmp_path: Path) -> None:
     curves = tmp_path / "spin.csv"
     curves.write_text("time,hip.rx,hip.ry,hip.rz\n0,0,0,0\n1,5.4e7,3,4\n2,0,0,0\n")

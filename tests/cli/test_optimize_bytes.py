@@ -54,6 +54,7 @@ def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert (tmp_path / "out.glb").stat().st_size == still
 
 
+@pytest.mark.slow
 def test_bytes_and_error_both_count(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     """The size at the bound itself fits, a byte less does not, though a larger error would do."""
     at_bound, output = tmp_path / "bound.glb", tmp_path / "out.glb"

@@ -17,6 +17,7 @@ import pytest
 
 from tests.cli.conftest import Call, Find
 from tests.cli.running import ENVIRONMENT, ROOT, TIMEOUT, built, refusal, shell
+from tests.files import mark_slow
 
 # The command line, but it stops before it puts its finished temporary file into place.
 PAUSED = """
@@ -65,7 +66,7 @@ entry_point.main()
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-@pytest.mark.parametrize("delay", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize("delay", mark_slow([0.1, 0.3, 0.6], slow=[0.1, 0.6]))
 def test_a_run_killed_at_work_leaves_nothing(number: signal.Signals, delay: float, asset: Find, tmp_path: Path) -> None:
     command = [
         sys.executable,

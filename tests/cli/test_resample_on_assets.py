@@ -14,13 +14,14 @@ from anim.measure.error.metric import ErrorMetric
 from tests import khronos
 from tests.cli.conftest import Call, Find
 from tests.cli.untouched import check_only_animations_changed
-from tests.files import ASSETS, REAL, opened, opened_path
+from tests.files import ASSETS, REAL, mark_slow, opened, opened_path
 
 # Splines of rotations with few keys: a multiple of their rate comes near their motion, but is not the same.
 COARSE = {"CubicRotate/01_cs_rotate.gltf": 5e-3}
 
 
 @khronos.needs_validator
+@pytest.mark.slow
 def test_real_files_get_no_new_validator_errors(call: Call, tmp_path: Path) -> None:
     names = [name for name in REAL if (ASSETS / name).is_file()]
     if not names:
@@ -53,14 +54,14 @@ def _codes(report: dict[str, Any]) -> Counter[str]:
     return Counter(line.split(" ")[0] for line in khronos.errors(report))
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_real_files_change_in_nothing_else(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
     source, out = asset(name), tmp_path / "out.glb"
     call("resample", source, out, "--fps", "24").product()
     check_only_animations_changed(source, out)
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_real_files_play_the_same_at_twice_their_rate(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
     source, out = asset(name), tmp_path / "out.glb"
     clips = call("inspect", source, "--format", "json").json["files"][0]["clips"]

@@ -12,6 +12,7 @@ import pytest
 import typer
 
 from cli import main
+from cli.command_table import COMMANDS
 from cli.workflows.run.steps import EDITING, MAKING, REFUSED
 from tests.cli.conftest import Call
 from tests.cli.running import built, help_line, refusal
@@ -270,7 +271,7 @@ def test_steps_show_no_progress_of_their_own(folder: Path, call: Call, monkeypat
 
 def test_commands_that_make_gltf_from_gltf_are_steps() -> None:
     group: Any = typer.main.get_command(main.app)
-    making = {name for name in main.COMMANDS if _makes_gltf(group.get_command(None, name))}
+    making = {name for name in COMMANDS if _makes_gltf(group.get_command(None, name))}
     assert making == {*EDITING, *MAKING}
 
 

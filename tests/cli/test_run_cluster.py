@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.running import ENVIRONMENT, ROOT, built, help_line, refusal, started
-from tests.cli.running_recipes import journal, variant, write_recipe
+from tests.cli.running import ENVIRONMENT, ROOT, help_line, refusal, started
+from tests.cli.running_recipes import journal, write_long_run
 
 needs_dask = pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="distributed is not installed")
 NUM_FILES = 16
@@ -47,11 +47,7 @@ def wait_for(path: Path, words: str, count: int, run: subprocess.Popen[bytes] | 
 
 @pytest.fixture
 def crowd(tmp_path: Path) -> Path:
-    """Files with work for some seconds, and their recipe."""
-    (tmp_path / "crowd").mkdir()
-    for number in range(NUM_FILES):
-        (tmp_path / f"crowd/{number:02}.glb").write_bytes(variant(built("biped"), number))
-    write_recipe(tmp_path, "resample --fps 60", "spline")
+    write_long_run(tmp_path, NUM_FILES)
     return tmp_path
 
 
@@ -59,6 +55,7 @@ def outputs(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in (folder / "build/crowd").iterdir()}
 
 
+@pytest.mark.slow
 @needs_dask
 def test_workers_of_a_cluster_make_the_same_bytes_also_if_one_is_killed(
     crowd: Path, call: Call, monkeypatch: pytest.MonkeyPatch

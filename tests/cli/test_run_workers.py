@@ -15,8 +15,9 @@ import pytest
 from cli.workflows.run.job import Job, JobResult
 from cli.workflows.run.workers import local_pool, run_jobs
 from tests.cli.conftest import Call
-from tests.cli.running import ENVIRONMENT, built, started
-from tests.cli.running_recipes import journal, statuses, variant, write_recipe
+from tests.cli.running import ENVIRONMENT, started
+from tests.cli.running_recipes import journal, statuses, write_long_run
+from tests.files import mark_slow
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 NUM_FILES = 20
@@ -46,11 +47,7 @@ def test_the_job_that_ends_its_process_is_named_and_all_others_are_done() -> Non
 
 @pytest.fixture
 def crowd(tmp_path: Path) -> Path:
-    """Files with work for some seconds, and their recipe."""
-    (tmp_path / "crowd").mkdir()
-    for number in range(NUM_FILES):
-        (tmp_path / f"crowd/{number:02}.glb").write_bytes(variant(built("biped"), number))
-    write_recipe(tmp_path, "resample --fps 60", "spline")
+    write_long_run(tmp_path, NUM_FILES)
     return tmp_path
 
 
@@ -97,7 +94,7 @@ def names_of(folder: Path) -> list[str]:
     return sorted(path.name for path in (folder / "build/crowd").iterdir())
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("how", mark_slow([signal.SIGKILL, signal.SIGTERM], slow=[signal.SIGTERM]))
 def test_a_worker_that_is_ended_costs_nothing(how: signal.Signals, crowd: Path) -> None:
     run = begin(crowd)
     wait_for_outputs(crowd, run, 2)
@@ -110,7 +107,12 @@ def test_a_worker_that_is_ended_costs_nothing(how: signal.Signals, crowd: Path) 
 
 @pytest.mark.parametrize(
     ("how", "options"),
-    [(signal.SIGKILL, ()), (signal.SIGKILL, ("--no-cache",)), (signal.SIGTERM, ()), (signal.SIGINT, ("--no-cache",))],
+    [
+        (signal.SIGKILL, ()),
+        pytest.param(signal.SIGKILL, ("--no-cache",), marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, (), marks=pytest.mark.slow),
+        (signal.SIGINT, ("--no-cache",)),
+    ],
 )
 def test_a_run_that_is_ended_leaves_nothing_half_written_and_resumes(
     how: signal.Signals, options: tuple[str, ...], crowd: Path, call: Call

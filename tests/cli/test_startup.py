@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from anim.simulation.registry import SIMULATIONS
-from cli import main
+from cli.command_table import COMMANDS
 from tests.cli.running import ENVIRONMENT, ROOT, built
 
 # Runs command lines in one process, and writes its exit codes and the modules loaded so far to stderr.
@@ -49,9 +49,9 @@ def test_the_first_help_imports_no_command_and_no_numbers() -> None:
 
 
 def test_the_help_of_a_command_imports_that_command_only() -> None:
-    results = _run(*([command, "--help"] for command in main.COMMANDS))
+    results = _run(*([command, "--help"] for command in COMMANDS))
     before: set[str] = set()
-    for command, (code, names) in zip(main.COMMANDS, results, strict=True):
+    for command, (code, names) in zip(COMMANDS, results, strict=True):
         assert code == 0
         assert not _packages(names) & HEAVY, command
         assert _commands(names) - before == {f"cli.commands.{command.replace('-', '_')}"}
@@ -89,13 +89,13 @@ def test_a_run_imports_only_packages_that_it_uses(tmp_path: Path) -> None:
 
 
 def test_completion_of_commands_imports_none() -> None:
-    cases = {"gltf-anim re": {"resample", "retime", "render"}, "gltf-anim ": set(main.COMMANDS), "gltf-anim zzz": set()}
+    cases = {"gltf-anim re": {"resample", "retime", "render"}, "gltf-anim ": set(COMMANDS), "gltf-anim zzz": set()}
     *results, (described, _) = _complete(*((words, "bash") for words in cases), ("gltf-anim ren", "zsh"))
     for (shown, names), expected in zip(results, cases.values(), strict=True):
         assert set(shown.split()) == expected
         assert not _packages(names) & (HEAVY | {"numpy"})
         assert not _commands(names)
-    assert main.COMMANDS["render"].about in described  # some shells show words beside names
+    assert COMMANDS["render"].about in described  # some shells show words beside names
 
 
 def test_options_and_their_choices_are_completed() -> None:

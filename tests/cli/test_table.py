@@ -6,8 +6,9 @@ import json
 import re
 import shlex
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -15,6 +16,7 @@ import typer
 import cli.commands
 from anim.errors import RangeError
 from cli import main
+from cli.command_table import COMMANDS
 from cli.commands import simulate
 from cli.typer_options import name_options
 from docs import pages
@@ -23,7 +25,7 @@ from tests.cli.running import ROOT, built
 from tests.fixtures.reading import split
 from tests.pages import missing as pages_missing
 
-EXAMPLES = [(command, example) for command, row in main.COMMANDS.items() for example in row.examples]
+EXAMPLES = [(command, example) for command, row in COMMANDS.items() for example in row.examples]
 EXAMPLES += [("simulate", example) for row in simulate.KINDS.values() for example in row.examples]
 # Command lines that make files which examples read.
 MAKING = (
@@ -65,22 +67,22 @@ def module(command: str) -> str:
 def test_every_command_is_a_module_and_every_module_a_command() -> None:
     folder = Path(next(iter(cli.commands.__path__)))
     found = {path.stem for path in (*folder.glob("*.py"), *folder.glob("[a-z]*/"))} - {"__init__"}
-    assert found == {module(command) for command in main.COMMANDS}
+    assert found == {module(command) for command in COMMANDS}
 
 
-@pytest.mark.parametrize("command", main.COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_is_tested_under_its_name(command: str) -> None:
     assert (ROOT / "tests" / "cli" / f"test_{module(command)}.py").is_file()
 
 
-@pytest.mark.parametrize("command", main.COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_is_in_the_readme(command: str) -> None:
     assert re.search(rf"gltf-anim {command}\b", (ROOT / "README.md").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("command", main.COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_the_help_has_the_examples_of_the_table(command: str, call: Call) -> None:
-    row = main.COMMANDS[command]
+    row = COMMANDS[command]
     text = " ".join(call(command, "--help").product().decode().split())
     assert f"Usage: gltf-anim {command}" in text
     assert row.examples
@@ -92,7 +94,7 @@ def test_the_help_has_the_examples_of_the_table(command: str, call: Call) -> Non
 def test_an_option_takes_the_same_kind_of_value_in_all_commands() -> None:
     kinds: dict[str, set[str]] = {}
     group = typer.main.get_command(main.app)
-    for command in main.COMMANDS:
+    for command in COMMANDS:
         for param in group.get_command(None, command).params:  # type: ignore[attr-defined]
             kind = "flag" if getattr(param, "is_flag", False) else str(param.metavar)
             for option in param.opts if param.param_type_name == "option" else ():
@@ -108,7 +110,7 @@ def test_errors_of_the_library_name_options_instead_of_parameters() -> None:
     assert error.help == "see gltf-anim ease --list"
 
 
-@pytest.mark.parametrize("command", main.COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_types_are_not_shown_as_python_has_them(command: str, call: Call) -> None:
     text = call(command, "--help").product().decode()
     assert not re.search(r"<(str|int|float)>|list\[", text)
@@ -150,7 +152,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "curves.csv").write_text(CURVES)
     (folder / "gltf-anim.toml").write_text(RECIPE)
     for line in MAKING:
-        if line.split()[0] in main.COMMANDS:
+        if line.split()[0] in COMMANDS:
             pages.run_here(f"gltf-anim {line}", folder)  # where one fails, only the examples that need it do
     return folder
 
@@ -167,7 +169,13 @@ def renamed(data: bytes, clips: Sequence[str]) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-@pytest.mark.parametrize(("command", "example"), [pytest.param(*each, id=each[1]) for each in EXAMPLES])
+def example_cases() -> Iterator[Any]:
+    """All examples; those of `optimize` are slow, and the README's run in the quick set."""
+    for command, example in EXAMPLES:
+        yield pytest.param(command, example, id=example, marks=[pytest.mark.slow] if command == "optimize" else [])
+
+
+@pytest.mark.parametrize(("command", "example"), list(example_cases()))
 def test_every_example_runs(command: str, example: str, examples: Path) -> None:
     if command == "view" and pages_missing():
         pytest.skip(pages_missing())

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import COMMANDS
+from cli.command_table import COMMANDS
 from tests import pages
 from tests.anim.skinning.odd_rigs import with_bad_sums
 from tests.cli.conftest import Call

@@ -81,7 +81,7 @@ def select_tracks(document: Document, selection: Selection, *, limit: int, view:
     return TrackSelection(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
 
 
-def compare(chosen: TrackSelection, other: Document) -> tuple[TrackSelection, int]:
+def compare_selection(chosen: TrackSelection, other: Document) -> tuple[TrackSelection, int]:
     """Return the tracks with their matches in another file, and the number without a match.
 
     Raises NotFoundError if there is no match.

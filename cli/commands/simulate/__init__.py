@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from anim.simulation.registry import SIMULATIONS
-from cli.main import CommandInfo, LazyGroup
+from cli.command_table import CommandInfo
+from cli.main import LazyGroup
 
 EXAMPLES = {
     "springs": (

@@ -13,6 +13,7 @@ import typer
 from typer import TyperException
 
 from cli import main
+from cli.command_table import COMMANDS
 from cli.errors import UsageError, usage_problem
 from cli.io.documents import PIPE
 from cli.streams import StepStreams, use_streams
@@ -88,7 +89,7 @@ def _check_command(words: list[str], *, is_first: bool) -> None:
     expected = f"a step is one of {', '.join(allowed)}"
     if name in MAKING:
         raise UsageError(f"'{name}' reads no glTF: it can only be the first step")
-    if name in main.COMMANDS:
+    if name in COMMANDS:
         raise UsageError(f"'{name}' makes no glTF from glTF", help=expected)
     near = difflib.get_close_matches(name, allowed, n=1)
     raise UsageError(f"there is no command '{name}'", help=f"did you mean '{near[0]}'?" if near else expected)

@@ -13,11 +13,10 @@ from anim.check.find import find_all
 from anim.check.finding import Finding
 from anim.check.selection import RuleSelection
 from anim.model import Track
-from tests.anim.check.cases import checked, found, step_of, with_tracks
+from tests.anim.check.cases import FRAMES, checked, found, jump, pop, step_of, tremble, with_tracks
 from tests.clips import track
 from tests.files import opened_fixture
 
-FRAMES = np.arange(40)
 Plant = Callable[[Floats], Floats]
 
 
@@ -28,18 +27,6 @@ def swing(plant: Plant = lambda degrees: degrees) -> Track:
     signs = np.where(np.random.default_rng(1).random(len(values)) < 0.5, -1.0, 1.0)
     joint = opened_fixture("arm").json["skins"][0]["joints"][1]
     return track("rotation", FRAMES / 30, values * signs[:, None], node=joint)
-
-
-def pop(degrees: Floats) -> Floats:
-    return np.asarray(degrees + 12.0 * (FRAMES == 20))
-
-
-def jump(degrees: Floats) -> Floats:
-    return np.asarray(degrees * 0.05 + 60.0 * (FRAMES >= 20))
-
-
-def tremble(degrees: Floats) -> Floats:
-    return np.asarray(degrees * 0.02 + 1.5 * (-1.0) ** FRAMES * ((FRAMES > 10) & (FRAMES < 22)))
 
 
 @pytest.mark.parametrize(("code", "plant"), [("GA301", pop), ("GA302", jump), ("GA303", tremble)])

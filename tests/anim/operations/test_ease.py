@@ -17,6 +17,7 @@ from anim.sampling.track import sample
 from tests import clips
 from tests.anim.operations.plain_eases import EASES, Ease, elastic_out
 from tests.clips import CUBICSPLINE, STEP
+from tests.files import mark_slow
 
 KEYS = np.array([0.0, 0.5, 1.25, 3.0])
 VALUES = np.array([[0.0, 1, 0], [2, -1, 0.5], [2.5, 3, 0], [-1, 0, 4]])
@@ -74,7 +75,10 @@ def test_vectors_follow_within_tolerance(name: str) -> None:
     assert new.interpolation is CUBICSPLINE
 
 
-@pytest.mark.parametrize("name", EASES)
+SLOW = ("cubic-bezier(.2, 0, 0, 1)", "ease-in", "ease-out", "ease-in-out")  # as `ease` is, which stays
+
+
+@pytest.mark.parametrize("name", mark_slow(EASES, SLOW))
 def test_rotations_follow_within_tolerance(name: str) -> None:
     assert off(TURN, eased(TURN, name), EASES[name]) <= ANGLE * 1.001
 

@@ -17,7 +17,7 @@ from anim.gltf.writing import writer
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip
 from anim.operations.resample import resample
-from tests.files import REAL, glb_of, opened, opened_fixture, opened_path
+from tests.files import REAL, glb_of, mark_slow, opened, opened_fixture, opened_path
 from tests.khronos import errors, needs_validator, validate_many
 
 Find = Callable[[str], Path]
@@ -27,7 +27,7 @@ PLAYED = 240  # Hz
 
 
 @pytest.mark.parametrize("multiple", [1, 2])
-@pytest.mark.parametrize("name", [name for name in REAL if name != "Knight.glb"])
+@pytest.mark.parametrize("name", mark_slow(name for name in REAL if name != "Knight.glb"))
 def test_a_multiple_of_the_source_rate_plays_back_the_source(name: str, multiple: int, asset: Find) -> None:
     _check_playback(opened_path(asset(name)), multiple, every=1)
 

@@ -270,6 +270,7 @@ def test_no_clips() -> None:
     assert (found.solutions, found.verdicts) == ({}, {})
 
 
+@pytest.mark.slow
 @needs_validator
 def test_the_validator_finds_no_new_errors() -> None:
     before, after, names = [], [], []

@@ -42,6 +42,7 @@ def test_a_sheet_is_as_wide_as_its_row() -> None:
     assert three[1] == one[1]
 
 
+@pytest.mark.slow
 def test_all_eases_can_be_drawn() -> None:
     names = [*EASINGS, "spring(100, 10)", "steps(3, jump-both)", "cubic-bezier(1, 0, 0, 1)", "hermite(-9, 40)"]
     for i in range(0, len(names), LIMIT):

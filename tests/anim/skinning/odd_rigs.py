@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.model import MeshInstance, Scene, Skin
+from anim.model import MeshInstance, Scene, Skeleton, Skin
 
 FLOAT = 5126
 UNIT = 100.0  # of the mesh, in metres
@@ -22,19 +22,22 @@ def with_root_without_weight(of: Scene) -> Scene:
     (instance,) = of.instances
     skin, body, count = instance.skin, instance.mesh, len(of.skeleton)
     assert skin is not None
-    nodes = of.skeleton
-    skeleton = replace(
-        nodes,
-        names=(*nodes.names, "root without weight"),
-        parents=np.append(nodes.parents, -1),
-        translation=np.append(nodes.translation, [[0.0, 0, 0]], axis=0),
-        rotation=np.append(nodes.rotation, [[0.0, 0, 0, 1]], axis=0),
-        scale=np.append(nodes.scale, [[1.0, 1, 1]], axis=0),
-    )
     binds = np.concatenate((np.eye(4)[None, :3], skin.inverse_bind / [UNIT, UNIT, UNIT, 1]))
     larger = replace(body, positions=body.positions * UNIT, joints=body.joints + 1)
     moved = MeshInstance(instance.node, larger, Skin(np.append(count, skin.joints), binds), instance.weights)
-    return Scene(skeleton, (moved,))
+    return Scene(with_root(of.skeleton, "root without weight"), (moved,))
+
+
+def with_root(skeleton: Skeleton, name: str) -> Skeleton:
+    """Return a skeleton with one more node, the last, at the origin."""
+    return replace(
+        skeleton,
+        names=(*skeleton.names, name),
+        parents=np.append(skeleton.parents, -1),
+        translation=np.append(skeleton.translation, [[0.0, 0, 0]], axis=0),
+        rotation=np.append(skeleton.rotation, [[0.0, 0, 0, 1]], axis=0),
+        scale=np.append(skeleton.scale, [[1.0, 1, 1]], axis=0),
+    )
 
 
 def with_bad_sums(glb: bytes) -> bytes:

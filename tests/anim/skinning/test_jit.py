@@ -87,6 +87,7 @@ def test_code_is_cached_for_one_version_and_set_of_sources(tmp_path: Path) -> No
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.nb?")} == files, "nothing was compiled again"
 
 
+@pytest.mark.slow
 def test_without_a_cache_folder_it_works_all_the_same(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_bytes(b"")

@@ -22,6 +22,7 @@ from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, MeshInstance, Scene, Skin, Track
 from anim.skinning.bake import prepare_bake
+from tests.anim.skinning.odd_rigs import with_root
 from tests.files import opened_fixture, opened_path
 from tests.usd import findings, opened_stage, skinned_stage, world_points
 
@@ -209,15 +210,7 @@ def test_skins_share_a_skeleton_if_their_bind_poses_agree(tmp_path: Path) -> Non
     document, scene, clip = arm()
     (instance,) = scene.instances
     other = len(scene.skeleton)
-    nodes = scene.skeleton
-    skeleton = replace(
-        nodes,
-        names=(*nodes.names, "other"),
-        parents=np.append(nodes.parents, -1),
-        translation=np.append(nodes.translation, [[0.0, 0, 0]], axis=0),
-        rotation=np.append(nodes.rotation, [[0.0, 0, 0, 1]], axis=0),
-        scale=np.append(nodes.scale, [[1.0, 1, 1]], axis=0),
-    )
+    skeleton = with_root(scene.skeleton, "other")
     json = {
         **document.json,
         "nodes": [*document.json["nodes"], {"mesh": document.json["nodes"][instance.node]["mesh"]}],

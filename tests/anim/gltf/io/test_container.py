@@ -17,7 +17,7 @@ from anim.gltf.document import Buffer, Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from fixtures.broken.pieces import data_uri, text
-from tests.files import REAL, glb_of, joined, opened, opened_fixture, opened_path
+from tests.files import REAL, glb_of, joined, mark_slow, opened, opened_fixture, opened_path
 
 Json = dict[str, Any]
 
@@ -191,7 +191,7 @@ def test_there_and_back_leaves_fixtures_as_they_were(name: str) -> None:
     _check_there_and_back(opened_fixture(name))
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_there_and_back_leaves_real_files_as_they_were(name: str, asset: Any) -> None:
     path: Path = asset(name)
     _check_there_and_back(opened_path(path))

@@ -18,7 +18,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from tests.anim.gltf.writing.documents import check_same, rewritten, viewed
-from tests.files import REAL, glb_of, opened, opened_fixture, opened_path
+from tests.files import REAL, glb_of, mark_slow, opened, opened_fixture, opened_path
 from tests.fixtures.reading import decode, split
 from tests.khronos import errors, needs_validator, validate_many
 
@@ -34,7 +34,7 @@ def _document(path: Path) -> Document:
     return opened_path(path)
 
 
-@pytest.fixture(params=EVERY)
+@pytest.fixture(params=mark_slow(EVERY))
 def document(request: pytest.FixtureRequest, asset: Find) -> Document:
     """Every fixture and every real file."""
     name: str = request.param

@@ -15,7 +15,7 @@ from anim.model import Clip, Scene, TimeAxis, Track
 from anim.operations.resample import resample
 from tests.anim.measure.error.brute_force import Find, brute, clip_of, with_track
 from tests.clips import clip, track
-from tests.files import opened_fixture, opened_path
+from tests.files import mark_slow, opened_fixture, opened_path
 
 RNG = np.random.default_rng(3)
 
@@ -45,7 +45,7 @@ def scene_and_clip(request: pytest.FixtureRequest, asset: Find) -> tuple[Scene, 
     return reader.scene(document), clip_of(document, name)
 
 
-@pytest.mark.parametrize("change", ["fewer keys", "noise", "one key", "late"])
+@pytest.mark.parametrize("change", mark_slow(["fewer keys", "noise", "one key", "late"], slow=["noise", "one key"]))
 def test_nothing_is_understated_and_little_is_overstated(scene_and_clip: tuple[Scene, Clip], change: str) -> None:
     scene, before = scene_and_clip
     after = CHANGES[change](before)

@@ -10,7 +10,7 @@ import pytest
 
 from anim.gltf.document import Document, Json
 from anim.measure.inspect.storage_cost import StorageCost, storage_costs
-from tests.files import REAL, SHARED, opened_path
+from tests.files import REAL, SHARED, mark_slow, opened_path
 
 KEYS = {"componentType": 5126, "count": 2}
 SHARING: Json = {
@@ -61,7 +61,7 @@ def test_no_animations_cost_nothing() -> None:
     assert storage_costs(Document({"asset": {"version": "2.0"}}, ())) == ([], StorageCost(0, 0))
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_real_files_part_by_part(name: str) -> None:
     path: Path = SHARED / "assets" / name
     if not path.is_file():

@@ -17,11 +17,11 @@ from anim.operations.resample import resample
 from anim.operations.selection import Selection
 from anim.show.plots.figure import SMALL, TITLE, style, text_width
 from anim.show.plots.track_plot import COLUMN, LIMIT, Names, track_plot
-from anim.show.plots.track_selection import TrackSelection, compare, select_tracks
+from anim.show.plots.track_selection import TrackSelection, compare_selection, select_tracks
 from tests import clips
 from tests.anim.show.reading import png_size, words
 from tests.clips import CUBICSPLINE, STEP, about
-from tests.files import REAL, opened_fixture, opened_path
+from tests.files import REAL, mark_slow, opened_fixture, opened_path
 
 ALL = Selection()
 BUMP = np.array([[0.0, 1, 0], [1, 1, 0], [0, 1, 0]])
@@ -101,7 +101,7 @@ def test_frames_are_marked_where_their_rate_is_known() -> None:
 
 def test_a_file_compared_with_itself() -> None:
     file = opened_fixture("interpolations")
-    both, alone = compare(select_tracks(file, ALL, limit=LIMIT), file)
+    both, alone = compare_selection(select_tracks(file, ALL, limit=LIMIT), file)
     assert alone == 0
     said = drawn(both, Names("a.glb", "b.glb"))
     assert said.count("difference: none") == len(both.shown)
@@ -112,7 +112,7 @@ def test_the_difference_is_named_with_its_place() -> None:
     before = Clip("wave", (clips.track("translation", [0, 1, 2], BUMP * 0.01),))
     after = resample(before, fps=0.5)
     skeleton = clips.skeleton([-1, 0, 1])
-    both, _ = compare(
+    both, _ = compare_selection(
         select_tracks(build_document(skeleton, [before]), ALL, limit=1), build_document(skeleton, [after])
     )
     said = drawn(both, Names("a", "b"))
@@ -142,7 +142,7 @@ def test_weights_are_called_by_their_targets(names: list[str] | None, shown: lis
 def test_partners_are_found_by_name_not_by_number() -> None:
     one = document(clips.track("translation", [0, 1, 2], BUMP, node=1), names=("a", "b", "c"))
     other = document(clips.track("translation", [0, 1, 2], BUMP, node=2), names=("c", "a", "b"))
-    both, alone = compare(select_tracks(one, ALL, limit=1), other)
+    both, alone = compare_selection(select_tracks(one, ALL, limit=1), other)
     assert alone == 0
     assert both.shown[0].other is not None
 
@@ -150,7 +150,9 @@ def test_partners_are_found_by_name_not_by_number() -> None:
 def test_no_partner_at_all() -> None:
     one = document(clips.track("translation", [0, 1, 2], BUMP))
     with pytest.raises(NotFoundError, match="none of the tracks") as caught:
-        compare(select_tracks(one, ALL, limit=1), document(clips.track("translation", [0, 1, 2], BUMP), name="run"))
+        compare_selection(
+            select_tracks(one, ALL, limit=1), document(clips.track("translation", [0, 1, 2], BUMP), name="run")
+        )
     assert caught.value.help == "its clips are 'run'"
 
 
@@ -169,7 +171,7 @@ def test_names_in_any_letters(name: str) -> None:
     assert png_size(track_plot(shown, title="", kind="png"))[0] > 900
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", mark_slow(REAL))
 def test_real_files(asset: Callable[[str], Path], name: str) -> None:
     found = select_tracks(opened_path(asset(name)), ALL, limit=2)
     said = words(track_plot(found.shown, title=name, kind="svg"))

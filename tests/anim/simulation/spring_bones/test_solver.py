@@ -76,6 +76,7 @@ def test_the_chains_swing_and_collide(case: Case) -> None:
         assert apart[[nodes.index(joint.node) for joint in chain.joints]].max() > 0.01, chain.name
 
 
+@pytest.mark.slow
 @needs_three_vrm
 def test_the_fixture_as_three_vrm_computes(case: Case, tmp_path: Path) -> None:
     """three-vrm as it is, against the plain loop with its two faults; which without them is ours."""

@@ -1,0 +1,141 @@
+"""The bakes of one command, a file each, and what its notes report on all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+from anim.caches.transforms import statistics, up_axis, vertex_order
+from anim.gltf.io.source import Source
+from anim.gltf.reading import reader
+from anim.model import Clip, Scene, VertexCache
+from anim.skinning.analysis.inbetween_error import InbetweenError, InbetweenMetric
+from anim.skinning.analysis.method_deviation import Deviation, MeasuredBake, linear_baker
+from anim.skinning.uneven import UnevenScale
+from cli import units
+from cli.errors import UsageError
+from cli.io import cache_files
+from cli.io.cache_files import SavedCache
+from cli.options import caches
+from cli.progress import Progress
+from cli.reports import bake_notes
+from cli.reports.bake_report import BakedFile, report_written
+from cli.text import Reporter
+from cli.workflows.bake_clip import BakeOptions, Output, keeps_nodes, source_options
+from cli.workflows.bake_jobs import BakeJob
+
+LINEAR = "lbs"  # blending as in every player, which other methods are compared with
+
+
+@dataclass(frozen=True, slots=True)
+class FileOptions:
+    """Options of the files. values: those of one format. max_error: a length, or % of the size."""
+
+    ending: str
+    values: Mapping[str, Any]
+    max_error: str | None
+    up: str | None
+    vertex_order: str | None
+    keep_skeleton: bool
+    dry_run: bool
+
+    def check(self, *, normals: bool, tangents: bool) -> None:
+        """Raise UsageError before any work for options that the format doesn't support."""
+        caches.write_options(self.ending, {**self.values, "max_error": self.max_error})
+        caches.check_supported(self.ending, normals=normals, tangents=tangents)
+        if self.keep_skeleton and not keeps_nodes(self.ending):
+            raise UsageError(f"--keep-skeleton does not apply to {self.ending}")
+
+    def transform(self, cache: VertexCache) -> VertexCache:
+        """Return a cache with the vertex order and the up axis of the options."""
+        if self.vertex_order is not None:
+            cache = vertex_order.reorder(cache, str(self.vertex_order))
+        return cache if self.up is None else up_axis.to_up_axis(cache, str(self.up))
+
+    def save(self, cache: VertexCache, file: str, source: Mapping[str, Any]) -> SavedCache:
+        """Write a cache. source: the write option of formats that keep materials."""
+        error = None
+        if self.max_error is not None:
+            error = units.parse_length(self.max_error, "--max-error", lambda: statistics.diagonal(cache))
+        options = caches.write_options(self.ending, {**self.values, "max_error": error, **source})
+        return cache_files.save(cache, file, options, ending=self.ending, dry_run=self.dry_run)
+
+
+class GroupBaker:
+    """Bakes clips of the meshes of a group, with what the notes need of them."""
+
+    def __init__(self, scene: Scene, nodes: Sequence[int] | None, options: BakeOptions) -> None:
+        self.baker = options.baker(scene, nodes)
+        self.inbetween = InbetweenMetric(self.baker)
+        is_linear = options.method == LINEAR
+        self.linear = None if is_linear else linear_baker(self.baker, space=options.space)
+        self.scales = None if is_linear else UnevenScale(self.baker)
+
+
+class BakeRun:
+    """Bakes clips into files one after another, and collects findings for the notes."""
+
+    def __init__(
+        self, source: Source, scene: Scene, options: BakeOptions, file_options: FileOptions, voice: Reporter
+    ) -> None:
+        self.files: list[BakedFile] = []
+        self._source, self._scene, self._options = source, scene, options
+        self._file_options, self._voice = file_options, voice
+        self._group: tuple[int, GroupBaker] | None = None
+        self._inbetween_errors: list[tuple[str, InbetweenError]] = []
+        self._deviations: list[tuple[str, Deviation]] = []
+        self._uneven_joints: set[int] = set()
+
+    def bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> None:
+        """Bake a clip into a file. nodes: of the meshes in the job's group, None for all."""
+        group = self._baker(job.group, nodes)
+        times, label = self._options.times(clip), reader.clip_label(clip.name, job.clip or 0)
+        if group.scales is not None:
+            self._uneven_joints.update(group.scales.joints(clip, times))
+        self._inbetween_errors.append((label, group.inbetween.largest_error(clip, times)))
+        progress = Progress(PurePath(job.file).name, len(times), shown=not self._voice.quiet)
+        measured = None
+        if group.linear is not None:
+            measured = MeasuredBake(group.baker, group.linear, clip, times, progress)
+        baked = group.baker.bake(clip, times=times, progress=progress) if measured is None else measured.cache
+        cache = self._file_options.transform(baked)
+        source = self._source_option(job, nodes, clip)
+        try:
+            saved = self._file_options.save(cache, job.file, source)
+        except BaseException:
+            report_written(self.files, self._voice, dry_run=self._file_options.dry_run)
+            raise
+        finally:
+            progress.close()
+        if measured is not None:
+            self._deviations.append((label, measured.deviation()))
+        self.files.append(BakedFile(job.file, clip.name, job.clip, job.group, len(times), cache.vertex_count, saved))
+
+    def report_findings(self) -> None:
+        """Report errors between frames, and where the method is unsuited or differs between tools."""
+        assert self._group is not None
+        rest, method = self._group[1].baker.rest, self._options.method
+        is_chosen = self._options.fps is not None
+        bake_notes.frame_gap_note(self._inbetween_errors, rest, self._voice, is_chosen=is_chosen)
+        bake_notes.lost_data_notes(self._deviations, method, self._voice)
+        bake_notes.uneven_scale_note(sorted(self._uneven_joints), self._scene, method, self._voice)
+
+    def _baker(self, index: int, nodes: Sequence[int] | None) -> GroupBaker:
+        """Return the baker of a group; that of one group at a time is in memory."""
+        if self._group is None or self._group[0] != index:
+            self._group = index, GroupBaker(self._scene, nodes, self._options)
+        return self._group[1]
+
+    def _source_option(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> Mapping[str, Any]:
+        options = self._file_options
+        return source_options(
+            self._source,
+            self._options,
+            self._scene,
+            nodes,
+            (job.clip, clip),
+            keep_skeleton=options.keep_skeleton,
+            output=Output(job.file, options.ending, options.dry_run),
+        )

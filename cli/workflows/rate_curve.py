@@ -1,0 +1,68 @@
+"""Curve of the size of animations against the error bound: on stderr, as CSV or as a picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from anim.optimization.options import Request
+from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, RatePoint, curve
+from anim.units import format_number
+from cli.errors import UsageError
+from cli.io import documents
+from cli.reports.optimize_report import cost
+from cli.text import Reporter, format_bytes, format_length
+from cli.workflows.optimize_job import OptimizeJob
+
+
+def check_curve_file(path: str) -> None:
+    """Raise UsageError for a file that is no table or picture, FileError for one that can't be written."""
+    documents.check_file(path)
+    if PurePath(path).suffix.lower() not in (".csv", ".png", ".svg"):
+        raise UsageError(f"{path}: is no .csv, .png or .svg file")
+
+
+def write_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
+    """Search with one bound after another, report each size, and write the curve."""
+    points = []
+    bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
+    for point in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
+        voice.info(_line(point, work.scale))
+        points.append(point)
+    if dry_run:
+        return
+    kind = PurePath(path).suffix.lower()[1:]
+    if kind == "csv":
+        documents.write_text(_csv(points, work.scale), path)
+    else:
+        from anim.show.plots.rate_distortion_plot import rate_distortion_plot
+
+        title, source = PurePath(work.source.name).name, cost(work.source.document)
+        picture = rate_distortion_plot(points, work.scale, title=title, kind=kind, source=source)
+        documents.write_bytes([np.frombuffer(picture, np.uint8)], path)
+
+
+def _line(point: RatePoint, scale: float) -> str:
+    percent = 100 * point.max_error / scale if scale else 0.0
+    bound = f"{format_length(point.max_error)} ({format_number(percent, 2)} %)" if point.max_error else "without loss"
+    sizes = f"animation {format_bytes(point.animation)}, file {format_bytes(point.size)}"
+    return f"  {bound}: {sizes}, max {format_length(point.error)}"
+
+
+def _csv(points: Sequence[RatePoint], scale: float) -> str:
+    """Return the curve as CSV.
+
+    Columns: bound in metres and as a fraction of the diagonal, bytes of the file, largest measured error, and bytes of
+    the animation alone.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["max_error_m", "share_of_diagonal", "bytes", "error_m", "animation_bytes"])
+    for each in points:
+        fraction = each.max_error / scale if scale else 0.0
+        writer.writerow([each.max_error, fraction, each.size, each.error, each.animation])
+    return text.getvalue()
