@@ -1,4 +1,4 @@
-"""Numbers in text: parsing of lengths, angles and fractions with units, and plain decimals."""
+"""Numbers in text: parsing of lengths, angles and fractions with units, plain decimals, and counts with a noun."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ def format_number(value: float, digits: int) -> str:
     """Return the value rounded to `digits` significant digits, without exponent: "0.41", "102", "1200"."""
     rounded = f"{float(f'{value:.{digits}g}'):.10f}"
     return rounded.rstrip("0").rstrip(".")
+
+
+def plural(count: int, noun: str) -> str:
+    """Return "1 clip", "3 clips"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def parse_fraction(text: str, name: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anim.errors import RangeError
-from anim.units import parse_angle, parse_fraction, parse_length
+from anim.units import parse_angle, parse_fraction, parse_length, plural
 
 
 def test_a_number_beyond_float64_is_refused() -> None:
@@ -19,3 +19,7 @@ def test_a_number_beyond_float64_is_refused() -> None:
     with pytest.raises(RangeError, match="1e400deg"):
         parse_angle("1e400deg", "tolerance")
     assert parse_length("1e300mm", "max_error", lambda: 1.0) == pytest.approx(1e297)
+
+
+def test_a_count_has_its_noun_in_the_singular_or_plural() -> None:
+    assert [plural(count, "clip") for count in (0, 1, 2)] == ["0 clips", "1 clip", "2 clips"]

@@ -25,6 +25,7 @@ from anim.errors import RangeError, UnsupportedError
 from anim.gltf.authoring_parts import VERTICES
 from anim.gltf.document import Json
 from anim.model import FrameChunk, VertexCache
+from anim.units import plural
 
 DEFAULT_ERROR_PER_DIAGONAL = 1e-3  # fraction of the diagonal, without a given limit
 MAX_POSITION_BYTES = 1 << 30  # of positions, three times this in memory
@@ -55,7 +56,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
     if best is None:
         quantized = ", or leave out `quantize`" if writing.quantize else ""
         raise RangeError(
-            f"{_counted(writing.max_targets, 'morph target')} can't keep every vertex within {limit:.3g} m",
+            f"{plural(writing.max_targets, 'morph target')} can't keep every vertex within {limit:.3g} m",
             help=f"allow a larger `max_error`, more `max_targets` (WebGL2 promises {MAX_TARGETS}){quantized}, or use "
             "`layout` flip-visibility",
         )
@@ -173,14 +174,10 @@ def _extras(cache: VertexCache, form: MorphEncoding) -> Json:
 
 def _notes(form: MorphEncoding, frames: int) -> tuple[str, ...]:
     words = {"keyframes": "a target per kept frame", "basis": "shapes and weights", "both": "shapes of kept frames"}
-    targets, keys = _counted(len(form.targets), "morph target"), _counted(len(form.frames), "key")
-    notes = [f"{targets} ({words[form.kind]}), {keys} for {_counted(frames, 'frame')}"]
+    targets, keys = plural(len(form.targets), "morph target"), plural(len(form.frames), "key")
+    notes = [f"{targets} ({words[form.kind]}), {keys} for {plural(frames, 'frame')}"]
     if len(form.targets) > PORTABLE_TARGETS:
         notes.append(
             f"glTF promises {PORTABLE_TARGETS} targets at a time; three.js, Babylon.js and Blender take hundreds"
         )
     return tuple(notes)
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"

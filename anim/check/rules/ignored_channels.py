@@ -10,6 +10,7 @@ from anim.check.rule import Parameters, Rule
 from anim.check.rules.unused_samplers import in_animation
 from anim.gltf.document import json_array
 from anim.gltf.validation.channel_targets import channel_target
+from anim.units import plural
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -17,7 +18,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for i, animation in enumerate(json_array(file.json, "animations")):
         ignored = sum(channel_target(channel) is None for channel in animation["channels"])
         if ignored:
-            yield in_animation(file, i, problem=f"{ignored} channels with an unknown target")
+            yield in_animation(file, i, problem=f"{plural(ignored, 'channel')} with an unknown target")
 
 
 RULE = Rule(

@@ -9,6 +9,7 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule
 from anim.gltf.document import json_array
+from anim.units import plural
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -17,7 +18,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     counts = Counter(joint for skin in skins for joint in set(skin["joints"]))
     shared = sorted(joint for joint, count in counts.items() if count > 1)
     if shared:
-        problem = f"{len(shared)} joints belong to several of the {len(skins)} skins"
+        verb = "belongs" if len(shared) == 1 else "belong"
+        problem = f"{plural(len(shared), 'joint')} {verb} to several of the {len(skins)} skins"
         yield file.in_node(shared[0], len(shared), problem=problem)
 
 

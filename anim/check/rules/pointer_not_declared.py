@@ -10,6 +10,7 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document, json_array
 from anim.gltf.validation.channel_targets import EXTENSION
+from anim.units import plural
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -17,7 +18,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     clips = json_array(file.json, "animations")
     uses = sum(EXTENSION in channel["target"].get("extensions", {}) for clip in clips for channel in clip["channels"])
     if uses and EXTENSION not in file.json.get("extensionsUsed", ()):
-        problem = f"{uses} channels use {EXTENSION}, which is not in extensionsUsed"
+        verb = "uses" if uses == 1 else "use"
+        problem = f"{plural(uses, 'channel')} {verb} {EXTENSION}, which is not in extensionsUsed"
         yield Occurrence("extensionsUsed", "/extensionsUsed", uses, problem=problem)
 
 

@@ -10,13 +10,15 @@ from anim.check.rule import Parameters, Rule
 from anim.check.rules.unused_samplers import REWRITE
 from anim.gltf.document import json_array
 from anim.gltf.validation.animation_storage import strided
+from anim.units import plural
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield one occurrence for all accessors."""
     found: set[int] = set().union(*(strided(file.json, each) for each in json_array(file.json, "animations")))
     if found:
-        problem = f"{len(found)} accessors are in views with byteStride"
+        verb = "is" if len(found) == 1 else "are"
+        problem = f"{plural(len(found), 'accessor')} {verb} in views with byteStride"
         yield Occurrence("animations", f"/accessors/{min(found)}", len(found), problem=problem)
 
 

@@ -11,6 +11,7 @@ from anim.check.rule import Parameters, Rule
 from anim.gltf.document import json_array
 from anim.gltf.reading import reader
 from anim.gltf.validation.animation_storage import unused_samplers
+from anim.units import plural
 
 REWRITE = "to rewrite them without other changes: gltf-anim retime IN OUT --speed 1"
 
@@ -19,7 +20,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips."""
     for i, animation in enumerate(json_array(file.json, "animations")):
         if unused := unused_samplers(animation):
-            yield in_animation(file, i, problem=f"{len(unused)} samplers in no channel")
+            yield in_animation(file, i, problem=f"{plural(len(unused), 'sampler')} in no channel")
 
 
 def in_animation(file: CheckedFile, number: int, *, problem: str) -> Occurrence:

@@ -16,6 +16,7 @@ from anim.gltf.io.images import media_type
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import BASISU, WEBP, image_data
 from anim.show.page.packing import Packing
+from anim.units import plural
 
 DRAWN = ("image/png", "image/jpeg", "image/webp", "image/avif")
 PREFERRED = (WEBP, "EXT_texture_avif")  # instead of a texture's own source
@@ -114,10 +115,6 @@ def _is_usable(index: Any, usable: Collection[int]) -> bool:
 
 def _notes(faults: list[str], lost: int) -> list[str]:
     if not faults:
-        return [f"{_counted(lost, 'texture')} without an image: drawn without"] if lost else []
+        return [f"{plural(lost, 'texture')} without an image: drawn without"] if lost else []
     more = f" and {len(faults) - MAX_LISTED_IMAGES} more" if len(faults) > MAX_LISTED_IMAGES else ""
-    return [f"{_counted(len(faults), 'image')} not drawn: {', '.join(faults[:MAX_LISTED_IMAGES])}{more}"]
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+    return [f"{plural(len(faults), 'image')} not drawn: {', '.join(faults[:MAX_LISTED_IMAGES])}{more}"]

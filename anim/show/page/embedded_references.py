@@ -6,6 +6,7 @@ from typing import Any
 
 from anim.gltf.document import Json, json_array
 from anim.show.page.embedded_names import LIGHTS, lights_of
+from anim.units import plural
 
 LIGHT_TYPES = ("directional", "point", "spot")
 
@@ -26,7 +27,7 @@ def drop_references(json: Json) -> list[str]:
             if "material" in primitive and not _is_object(primitive["material"], materials):
                 del primitive["material"]
                 lost += 1
-    return [f"{lost} reference{'' if lost == 1 else 's'} to missing materials or lights left out"] if lost else []
+    return [f"{plural(lost, 'reference')} to missing materials or lights left out"] if lost else []
 
 
 def _is_light(part: Any, lights: list[Any]) -> bool:

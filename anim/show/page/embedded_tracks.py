@@ -9,6 +9,7 @@ from anim.gltf.document import Json, json_array
 from anim.gltf.reading.accessors import FLOAT, Accessors
 from anim.gltf.validation.channel_targets import channel_target
 from anim.show.page.embedded_nodes import shown_nodes
+from anim.units import plural
 
 MAX_LISTED_POINTERS = 3  # pointers in a note
 _MESH_WEIGHTS = re.compile(r"/meshes/(0|[1-9][0-9]{0,8})/weights")
@@ -70,11 +71,7 @@ def _notes(pointers: Sequence[str], outside: int) -> list[str]:
     notes = []
     if pointers:
         more = f" and {len(pointers) - MAX_LISTED_POINTERS} more" if len(pointers) > MAX_LISTED_POINTERS else ""
-        notes.append(f"{_tracks(len(pointers))} not shown: {', '.join(pointers[:MAX_LISTED_POINTERS])}{more}")
+        notes.append(f"{plural(len(pointers), 'track')} not shown: {', '.join(pointers[:MAX_LISTED_POINTERS])}{more}")
     if outside:
-        notes.append(f"{_tracks(outside)} not shown: of nodes outside the default scene")
+        notes.append(f"{plural(outside, 'track')} not shown: of nodes outside the default scene")
     return notes
-
-
-def _tracks(count: int) -> str:
-    return f"{count} track{'' if count == 1 else 's'}"

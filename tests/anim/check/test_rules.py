@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,12 @@ def test_a_rule_finds_what_breaks_it(code: str) -> None:
     findings = find_all(broken(code), selection(code))
     assert findings
     assert all(each.pointer.startswith(WRONG[code][1]) and each.problem and each.advice for each in findings)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_one_of_a_kind_is_in_the_singular(code: str) -> None:
+    for each in find_all(broken(code), selection(code)):
+        assert not re.search(r"(^|[^.\d])\b1 [a-z]{2,}s\b", each.problem), each.problem
 
 
 @pytest.mark.parametrize("code", CODES)
