@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
+from anim.measure.equal_clips import first_equal
 from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimization import writing
 from anim.optimization.clip import Task
-from anim.optimization.clip_optimizer import ClipOptimizer, optimize_clip
+from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clip
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
@@ -67,25 +68,37 @@ def optimize(
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
     optimizer = ClipOptimizer(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
     tasks = _tasks(optimizer, chosen)
-    solutions: dict[int, Solution] = {}
-    verdicts: dict[int, Verification] = {}
-    without_loss: list[int] = []
+    first = _first_equal(tasks)
+    distinct = [task for n, task in enumerate(tasks) if first[n] == n]
 
     def name(item: tuple[int, object]) -> str:
         return reader.clip_label(clips[item[0]].name, item[0])
 
-    with process_pool(min(workers, len(tasks)), optimizer, start=start) as pool:
-        results = pool.each(optimize_clip, tasks, label=name, work=lambda item: _work(item[1].clip))
-        for (number, _), each in zip(tasks, results, strict=True):
-            solutions[number], verdicts[number] = each.solution, each.verdict
-            without_loss += [number] if each.without_loss else []
-            progress(len(solutions) / len(tasks))
+    found: dict[int, ClipResult] = {}
+    with process_pool(min(workers, len(distinct)), optimizer, start=start) as pool:
+        results = pool.each(optimize_clip, distinct, label=name, work=lambda item: _work(item[1].clip))
+        for (number, _), each in zip(distinct, results, strict=True):
+            found[number] = each
+            progress(len(found) / len(distinct))
+    found = {number: found[tasks[first[n]][0]].named(clips[number].name) for n, (number, _) in enumerate(tasks)}
+    solutions = {number: each.solution for number, each in found.items()}
+    verdicts = {number: each.verdict for number, each in found.items()}
+    without_loss = [number for number, each in found.items() if each.without_loss]
     new = write_solutions(base.document if base else document, solutions, request.packing)
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):
         verdicts[number] = optimizer.verify(number, read_back[number])
     done = writing.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
+
+
+def _first_equal(tasks: Sequence[tuple[int, Task]]) -> list[int]:
+    """For each task the first one with the same result: equal clips are optimized once."""
+    first = first_equal([(task.clip,) for _, task in tasks])
+    return [
+        k if tasks[k][1].at_rest == task.at_rest else n
+        for n, (k, (_, task)) in enumerate(zip(first, tasks, strict=True))
+    ]
 
 
 def _work(clip: Clip) -> float:

@@ -15,9 +15,11 @@ import pytest
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
+from anim.optimization import optimize as optimization
 from fixtures.broken.pieces import buffered, text
 from tests.cli.conftest import Call
 from tests.cli.running import refusal, started
+from tests.files import clips_of
 
 NODES = 20_000  # linear work on them takes seconds
 CLIPS = 300
@@ -80,6 +82,27 @@ def test_equal_loops_are_analyzed_once(
     counted = _count_calls(monkeypatch, loop_analysis, "_judge")
     call("loop", tmp_path / "in.gltf", *(str(tmp_path / "out.glb") if each == "OUT" else each for each in options))
     assert len(counted) == 1
+
+
+def test_equal_clips_are_optimized_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third clip differs: it gets its own result, and every clip its own name."""
+    steps = np.arange(6.0)
+    line = np.stack((steps, 0 * steps, 0 * steps), axis=1)
+    keys = buffered(("SCALAR", 5126, steps), ("VEC3", 5126, line), ("VEC3", 5126, line[:, ::-1]))
+    channels = [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]
+    outputs = [1, 1, 2, 1]
+    clips = [
+        {"name": f"c{i}", "samplers": [{"input": 0, "output": output}], "channels": channels}
+        for i, output in enumerate(outputs)
+    ]
+    path = tmp_path / "in.gltf"
+    path.write_bytes(text({"nodes": [{"name": "n"}], **keys, "animations": clips}))
+    counted = _count_calls(monkeypatch, optimization, "optimize_clip")
+    call("optimize", path, tmp_path / "out.glb", "--max-error", "1mm", "--jobs", "1").product()
+    assert len(counted) == 2
+    found = clips_of((tmp_path / "out.glb").read_bytes())
+    assert [(clip.name, len(clip.tracks[0].times)) for clip in found] == [(f"c{i}", 2) for i in range(4)]
+    assert [clip.tracks[0].values[-1].tolist() for clip in found] == [[5, 0, 0], [5, 0, 0], [0, 0, 5], [5, 0, 0]]
 
 
 def test_a_plot_takes_the_span_of_a_clip_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
