@@ -62,7 +62,8 @@ def _neighborhoods(topology: ClothTopology, x: Floats, usable: Bools, is_flat: B
     flat = adjacency(usable & is_flat)
     rings = (adjacency(usable) + flat @ flat + flat @ flat @ flat).tocoo()
     lengths = np.linalg.norm(x[rings.row] - x[rings.col], axis=1)
-    return coo_array((lengths, (rings.row, rings.col)), shape=(len(x), len(x))).tocsr()
+    ends = rings.row.astype(np.int32), rings.col.astype(np.int32)  # `dijkstra` of scipy 1.12 takes no others
+    return coo_array((lengths, ends), shape=(len(x), len(x))).tocsr()
 
 
 def find_flat_points(topology: ClothTopology, x: Floats, cosine: float) -> Bools:
