@@ -13,6 +13,7 @@ from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.retarget.bind_pose import bind_pose, fill_from_parents
 from anim.exchange.retarget.ground_contact import has_feet
 from anim.exchange.retarget.joint_matching import JointMatch, match_joints, match_same_hierarchy
+from anim.exchange.retarget.reflection import match_handedness
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.exchange.retarget.retarget import GroundMode, retarget
 from anim.model import Clip, Scene, Skeleton
@@ -87,7 +88,8 @@ def apply_to_character(
         bound = bind_pose(
             target.skeleton, [(each.node, each.skin) for each in target.instances if each.skin is not None]
         )
-        done = retarget(source, replace(target, skeleton=bound.skeleton), matching, floor=floor, bind_time=bind_time)
+        figure = replace(target, skeleton=match_handedness(source.skeleton, bound.skeleton, matching))
+        done = retarget(source, figure, matching, floor=floor, bind_time=bind_time)
         clip = fill_from_parents(done.clip, bound.skeleton, target.skeleton)
         return CharacterClip(
             clip,

@@ -1,0 +1,50 @@
+"""A character mirrored as a whole has the motion of its own figure, mirrored with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats
+from anim.exchange.euler.from_euler import ImportedMotion
+from anim.exchange.retarget.apply import apply_to_character
+from anim.model import Clip, Scene, Skeleton
+from anim.sampling import sample_pose
+from tests.clips import about, clip, skeleton, track
+
+OFFSETS = np.array(((0.0, 1, 0), (0.3, 0.4, 0.1), (0.5, 0, 0), (0, 0.3, 0.2), (-0.4, 0.1, 0)))
+PARENTS = [-1, 0, 1, 0, 0]
+TIMES = np.linspace(0, 1, 9)
+
+
+def _motion() -> Clip:
+    arm = track("rotation", [0, 1], about("z", [0, 70]), node=1)
+    elbow = track("rotation", [0, 1], about("y", [0, -50]), node=2)
+    path = track("translation", [0, 1], np.array([[0.0, 1, 0], [0.2, 1.1, 0.5]]), node=0)
+    return clip(path, arm, elbow)
+
+
+def _below(scale: tuple[float, float, float], rotation: Floats) -> Skeleton:
+    """The figure below a node of a scale and a rotation; its nodes are one later."""
+    names = ("wrap", *map(str, range(5)))
+    parents = [-1, *(parent + 1 for parent in PARENTS)]
+    rotations = np.tile((0.0, 0, 0, 1), (6, 1))
+    rotations[0] = rotation
+    scales = np.ones((6, 3))
+    scales[0] = scale
+    return Skeleton(names, np.array(parents), np.concatenate(([[0.3, 0, -2]], OFFSETS)), rotations, scales)
+
+
+@pytest.mark.parametrize("scale", [(-1, 1, 1), (1, 1, -1), (2, -2, 2), (-1, -1, -1), (1, 1, 1), (-1, 1, -1)])
+@pytest.mark.parametrize("angle", [0.0, 40.0])
+def test_a_mirrored_figure_keeps_the_local_motion(scale: tuple[float, float, float], angle: float) -> None:
+    figure = skeleton(PARENTS, translation=OFFSETS)
+    motion = _motion()
+    target = _below(scale, about("y", [angle])[0])
+    done = apply_to_character(
+        ImportedMotion(figure, motion, frozenset(), 1e-4), Scene(target, ()), aliases={}, nested=True
+    )
+    expected, found = sample_pose(figure, motion, TIMES), sample_pose(target, done.clip, TIMES)
+    dots = np.abs((expected.rotation * found.rotation[:, 1:]).sum(axis=-1))
+    np.testing.assert_allclose(dots, 1.0, atol=1e-6)
+    np.testing.assert_allclose(found.translation[:, 1:], expected.translation, atol=1e-5)
