@@ -118,8 +118,3 @@ def _round_significant(seconds: float) -> str:
 def format_duration(seconds: float) -> str:
     """Return the run time of the command, marked to differ from a clip's duration: "took 0.8 s"."""
     return f"took {format_number(seconds, 2 if seconds < 10 else 3)} s"
-
-
-def plural(count: int, noun: str) -> str:
-    """Return "1 clip", "3 clips"."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"

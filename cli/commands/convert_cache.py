@@ -16,6 +16,7 @@ from anim.caches.registry import CACHE_FORMATS, READABLE
 from anim.caches.transforms import resample, statistics, up_axis
 from anim.caches.transforms.vertex_order import reorder
 from anim.model import FrameChunk, VertexCache
+from anim.units import plural
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import cache_files, documents
@@ -138,7 +139,7 @@ def command(
     name = loaded.name if output == documents.PIPE else output
     parts = [
         f"{name}  {text.format_change(size, saved.size)}",
-        f"{text.plural(cache.frame_count, 'frame')} of {cache.vertex_count} vertices",
+        f"{plural(cache.frame_count, 'frame')} of {cache.vertex_count} vertices",
     ]
     if saved.written.max_error is not None:
         parts.append(f"max {text.format_length(saved.written.max_error)}")

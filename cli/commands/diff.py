@@ -27,7 +27,7 @@ from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
 from anim.show.plots import error_plot as picture
 from anim.show.plots.figure import FORMATS
-from anim.units import is_zero
+from anim.units import is_zero, plural
 from cli import units
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
@@ -36,7 +36,7 @@ from cli.options.common import Format
 from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
-from cli.text import Reporter, format_bytes, format_length, plural
+from cli.text import Reporter, format_bytes, format_length
 from cli.workflows.vertex_diff import diff_by_vertex, is_cache
 from cli.workflows.vertex_motion import is_bake_of, pages_of
 

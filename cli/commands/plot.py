@@ -22,13 +22,14 @@ from anim.show.plots.track_plot import LIMIT, Names, track_plot
 from anim.show.plots.track_selection import TrackSelection, compare_selection, select_tracks
 from anim.simulation.comparison import Comparison, compare_integrators
 from anim.simulation.mass_spring import oscillator
+from anim.units import plural
 from cli.errors import UsageError
 from cli.io import documents
 from cli.io.terminal import choose_protocol, print_picture
 from cli.options import common
 from cli.options import terminal as pictures
 from cli.options.simulation import parse_seconds
-from cli.text import Reporter, format_bytes, plural
+from cli.text import Reporter, format_bytes
 
 NUM_PERIODS = 10  # of the oscillator
 MAX_STEPS = 100_000  # of it

@@ -30,6 +30,7 @@ from anim.show.filmstrip.camera import AZIMUTH, ELEVATION
 from anim.show.filmstrip.clips import FilmstripClip, FrameSelection
 from anim.show.filmstrip.filmstrip import HEIGHT, ViewOptions
 from anim.show.terminal.picture import Protocol
+from anim.units import plural
 from cli import text
 from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
@@ -181,7 +182,7 @@ def command(
         documents.write_bytes([np.frombuffer(drawn, np.uint8)], output)
     else:
         print_picture(drawn, shown)
-    frames = text.plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
+    frames = plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == documents.PIPE else output
     voice.info(
         f"{called}  {text.format_bytes(len(drawn))}, {frames}, {text.format_duration(time.perf_counter() - began)}"

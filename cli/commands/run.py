@@ -12,11 +12,12 @@ from typing import Annotated
 import typer
 
 from anim.errors import NotFoundError
+from anim.units import plural
 from cli import errors, units
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
-from cli.text import Reporter, format_bytes, plural
+from cli.text import Reporter, format_bytes
 from cli.workflows.run import cache as caching
 from cli.workflows.run import journal as journals
 from cli.workflows.run import outputs

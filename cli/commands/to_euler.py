@@ -21,7 +21,7 @@ from anim.gltf.reading import reader
 from anim.maths.euler import AxesConvention
 from anim.model import Clip
 from anim.operations.selection import Selection
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import documents
@@ -105,7 +105,7 @@ def command(
     if not dry_run:
         documents.write_text(data.decode(), output)
     if num_bound:
-        resting = f"{text.plural(num_bound, 'joint')} rest elsewhere in the file than the skin was bound"
+        resting = f"{plural(num_bound, 'joint')} rest elsewhere in the file than the skin was bound"
         voice.warn(f"{resting}: the bind pose is the rest of these curves")
     for note in motion.notes:
         voice.warn(note)
@@ -115,7 +115,7 @@ def command(
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     voice.info(
-        f"{name}  {text.format_change(source.size, len(data))}, {text.plural(len(motion.nodes), 'node')}, "
+        f"{name}  {text.format_change(source.size, len(data))}, {plural(len(motion.nodes), 'node')}, "
         f"{words}{text.format_duration(time.perf_counter() - began)}{ending}"
     )
 
@@ -157,7 +157,7 @@ def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
     if len(chosen) != 1:
         names = ", ".join(f"'{reader.clip_name(clips[i].name, i)}'" for i in chosen[:8])
         raise NotFoundError(
-            f"{text.plural(len(chosen), 'clip')} to choose from (expected one)",
+            f"{plural(len(chosen), 'clip')} to choose from (expected one)",
             help=f"--clip one of {names}" if chosen else "",
         )
     return clips[chosen[0]]

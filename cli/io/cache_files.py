@@ -19,7 +19,7 @@ from anim.caches.storage import suffix
 from anim.errors import AnimError, DataRangeError, FormatError, OutputError, not_written
 from anim.files import resolver
 from anim.model import VertexCache
-from cli import text
+from anim.units import plural
 from cli.errors import UsageError
 from cli.io import cache_folders, documents
 
@@ -168,7 +168,7 @@ def orphans_note(path: str, written: Sequence[str], ending: str) -> tuple[str, .
         there = os.listdir(target.parent)
     notes = []
     if old := [name for name in mesh_sequence.sequence_files(target.name, there) if name not in written]:
-        notes.append(f"{text.plural(len(old), 'frame')} of before still there, from {old[0]} on")
+        notes.append(f"{plural(len(old), 'frame')} of before still there, from {old[0]} on")
     if target.name in there and target.name not in (*written, *old):
         notes.append(f"{target.name} of before is still there, and is what that name reads")
     return tuple(notes)

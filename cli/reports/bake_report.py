@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from anim.units import plural
 from cli import text
 from cli.io import documents
 from cli.io.cache_files import SavedCache
-from cli.text import Reporter, plural
+from cli.text import Reporter
 
 MAX_LISTED_FILES = 8  # files in a note
 

@@ -9,10 +9,10 @@ from itertools import groupby
 from anim.check.baseline import FileFinding, fingerprint
 from anim.check.finding import Finding, Severity
 from anim.errors import AnimError
+from anim.units import plural
 from cli import tables
 from cli.reports import json_report
 from cli.tables import escape_control
-from cli.text import plural
 
 SCHEMA = 1
 SOURCE = "source"  # begins the position of errors in the source of a budget

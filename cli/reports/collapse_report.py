@@ -11,9 +11,9 @@ from anim.skinning.analysis.collapse import LOW_INDEX, MeshCollapse
 from anim.skinning.analysis.collapsed_clips import MIN_VOLUME_FRACTION, is_collapsed
 from anim.skinning.analysis.method_scores import BULGE_RATIO, MethodScore
 from anim.skinning.analysis.recommendations import CollapseFinding, recommend
+from anim.units import plural
 from cli import tables
 from cli.reports import json_report
-from cli.text import plural
 
 SCHEMA = 1
 

@@ -10,11 +10,11 @@ from typing import Any
 from anim.gltf.reading.reader import clip_name
 from anim.measure.continuity.continuity import ContinuityClass, LoopGap, MaxJump, TrackContinuity
 from anim.measure.inspect.report import ClipReport
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli import tables
 from cli.reports.inspect_report import Inspected, Smoothness
 from cli.tables import Cell
-from cli.text import format_instant, format_length, plural
+from cli.text import format_instant, format_length
 
 
 def table(clip: ClipReport, tracks: Sequence[TrackContinuity]) -> str:

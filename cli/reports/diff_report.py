@@ -11,10 +11,10 @@ from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.diff import END_TOLERANCE_S, ClipDiff, Diff
 from anim.measure.error.statistics import Peak
 from anim.measure.inspect.storage_cost import StorageCost
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli import tables
 from cli.reports import json_report
-from cli.text import format_change, format_length, format_speed, plural
+from cli.text import format_change, format_length, format_speed
 
 SCHEMA = 1
 MAX_LISTED_NAMES = 5  # listed names that only one file has

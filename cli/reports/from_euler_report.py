@@ -13,6 +13,7 @@ from anim.exchange.euler.motion import EulerMotion
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.model import Skeleton
+from anim.units import plural
 from cli import tables, text
 from cli.reports import json_report
 
@@ -49,7 +50,7 @@ def warnings(made: ConversionReport) -> Iterator[str]:
     if made.is_guess:
         yield f"scale: {made.scale_words}"
     if made.onto is not None and made.onto.num_bound:
-        moved = f"{text.plural(made.onto.num_bound, 'joint')} of the character rest elsewhere than its skin was bound"
+        moved = f"{plural(made.onto.num_bound, 'joint')} of the character rest elsewhere than its skin was bound"
         yield f"{moved}: that pose is taken for the rest"
     if made.onto is not None:
         yield from _guesses(made.onto)
@@ -77,7 +78,7 @@ def counts(made: ConversionReport) -> str:
     joints = len(made.converted.skeleton) - len(made.converted.ends)
     clip = made.converted.clip
     long = text.format_time(clip.end - clip.start)
-    return f"{text.plural(joints, 'joint')}, {text.plural(most, 'key')} at most, {long} long"
+    return f"{plural(joints, 'joint')}, {plural(most, 'key')} at most, {long} long"
 
 
 def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
@@ -122,7 +123,7 @@ def _angles_line(motion: EulerMotion) -> Iterator[str]:
 def _gimbal_line(rows: tuple[GimbalStats, ...]) -> str:
     near = [row for row in rows if row.nearest_deg < NEAR_DEG]
     worst = min(rows, key=lambda row: row.nearest_deg)
-    words = f"gimbal: {len(near)} of {text.plural(len(rows), 'joint')} within {NEAR_DEG}° of lock; nearest "
+    words = f"gimbal: {len(near)} of {plural(len(rows), 'joint')} within {NEAR_DEG}° of lock; nearest "
     words += f"'{worst.node}', {round(worst.nearest_deg, 2):.2g}° at {text.format_instant(worst.at_s)}"
     if worst.best_order != worst.order:
         words += f" ({worst.order}; {worst.best_order} would keep {worst.best_nearest_deg:.2g}°)"
@@ -163,7 +164,7 @@ def _onto_lines(made: ConversionReport, onto: CharacterClip, character: Skeleton
     left = [names[node] for node in onto.matching.unmatched]
     total = len(left) + len(onto.matching.pairs)
     rest = f"; not: {listed(left)}" if left else ""
-    yield f"onto: {len(onto.matching.pairs)} of {text.plural(total, 'joint')} matched{rest}"
+    yield f"onto: {len(onto.matching.pairs)} of {plural(total, 'joint')} matched{rest}"
     if made.motion.nested:
         low, high = (text.format_length(abs(each)) for each in onto.lowered)
         ways = ["down" if each >= 0 else "up" for each in onto.lowered]

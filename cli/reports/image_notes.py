@@ -9,7 +9,7 @@ from anim.errors import FormatError
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import uri
 from anim.gltf.io.images import external_uri, read_image
-from cli import text
+from anim.units import plural
 
 MAX_LISTED_NAMES = 3  # names in a note
 
@@ -23,19 +23,19 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
     lost = [image["uri"] for image in outside if read_image(folder, image) is None]
     found = [image["uri"] for image in outside if image["uri"] not in lost]
     if found and copied:
-        yield f"note: {text.plural(len(found), 'image')} copied beside the output ({_listed(found)})"
+        yield f"note: {plural(len(found), 'image')} copied beside the output ({_listed(found)})"
     elif found:
         verb = "stays" if len(found) == 1 else "stay"
-        yield f"note: {text.plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
+        yield f"note: {plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
     away = [address for address in lost if folder is not None and _is_outside(address)]
     if away:
         words = "refers" if len(away) == 1 else "refer"
         yield (
-            f"note: {text.plural(len(away), 'image')} {words} out of the file's folder, never copied, and missing "
+            f"note: {plural(len(away), 'image')} {words} out of the file's folder, never copied, and missing "
             f"unless the same address is right for the output ({_listed(away)})"
         )
     if lost := [address for address in lost if address not in away]:
-        yield f"note: {text.plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
+        yield f"note: {plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
 
 
 def _is_outside(address: str) -> bool:

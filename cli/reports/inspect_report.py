@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, TypeAlias
 from anim.check.finding import Finding
 from anim.gltf.reading.reader import clip_name
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
+from anim.units import plural
 from cli import tables
 from cli.tables import Cell
-from cli.text import format_bytes, format_length, format_span, format_speed, plural
+from cli.text import format_bytes, format_length, format_span, format_speed
 
 if TYPE_CHECKING:
     from anim.measure.continuity.continuity import TrackContinuity

@@ -17,10 +17,10 @@ from anim.optimization.options import Drop, Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from anim.optimization.writing import KEY
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli.errors import CheckError
 from cli.reports import optimize_bound
-from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length, plural
+from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
 
 MAX_LISTED = 3  # positions in the file that a note lists
 MIN_PARALLEL_KEYS = 60_000  # keys times tracks; above, worker processes save more time than they cost

@@ -6,9 +6,10 @@ import re
 
 from anim.check.finding import Finding, Severity
 from anim.show.page.page import PageLink, PagePanel, PageRow
+from anim.units import plural
 from cli.reports.inspect_report import Inspected
 from cli.reports.optimize_report import OptimizeReport, cost
-from cli.text import format_bytes, format_change, plural
+from cli.text import format_bytes, format_change
 
 _CLIP = re.compile(r"/animations/(\d+)")
 _NODE = re.compile(r"/nodes/(\d+)")

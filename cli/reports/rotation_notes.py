@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from anim.gltf.reading import reader
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip
-from cli.text import Reporter, plural
+from anim.units import plural
+from cli.text import Reporter
 
 
 def describe_non_unit_keys(counts: Sequence[tuple[str, int, int]]) -> str:

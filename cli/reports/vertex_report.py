@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from anim.measure.compare.vertex_distance import VertexDistance
+from anim.units import plural
 from cli import tables
 from cli.reports import json_report
-from cli.text import format_change, format_length, plural
+from cli.text import format_change, format_length
 
 SCHEMA = 1
 HEADER = ("clip", "mesh", "vertex", "time s", "max error", "% of size", "p99", "mean")

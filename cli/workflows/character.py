@@ -18,7 +18,8 @@ from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Scene
 from anim.operations.selection import Selection
-from cli import tables, text
+from anim.units import plural
+from cli import tables
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
 from cli.reports import from_euler_report
@@ -74,9 +75,9 @@ def put_on_character(
         old = reader.clips(document)[casting.replaced]
         stay, num_gone = retained_tracks(old, done)
         if stay:
-            voice.info(f"note: {text.plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
+            voice.info(f"note: {plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
         if num_gone:
-            what = f"{text.plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
+            what = f"{plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
             voice.warn(f"{what} go with it: it is another figure's motion")
         scaled = scaled_ancestors(done, stay, scene.skeleton)
         if scaled:

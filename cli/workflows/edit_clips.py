@@ -23,12 +23,12 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
 from cli.reports.rotation_notes import describe_non_unit_keys
-from cli.text import format_span, format_time, plural
+from cli.text import format_span, format_time
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by index in the file

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from anim.errors import AnimError, NotFoundError, not_written
+from anim.units import plural
 from cli import errors
 from cli.errors import UsageError
 from cli.io import documents, input_files, output_names
-from cli.text import Reporter, plural
+from cli.text import Reporter
 from cli.typer_options import name_options
 
 

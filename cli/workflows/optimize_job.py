@@ -18,14 +18,14 @@ from anim.operations.selection import Selection
 from anim.optimization.optimize import Optimized, optimize
 from anim.optimization.options import Bounds, Request
 from anim.optimization.rate_distortion import MAX_BOUND_PER_DIAGONAL, RatePoint, smallest_error
-from anim.units import format_number, is_zero
+from anim.units import format_number, is_zero, plural
 from cli import units
 from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress
 from cli.reports import optimize_report
 from cli.streams import step_streams
-from cli.text import Reporter, format_length, plural
+from cli.text import Reporter, format_length
 
 DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
 

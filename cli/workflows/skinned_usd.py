@@ -15,6 +15,7 @@ from anim.gltf.reading import reader
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
+from anim.units import plural
 from cli import text
 from cli.errors import UsageError
 from cli.io import cache_folders, documents, scenes
@@ -81,7 +82,7 @@ def _convert(
     _note_error(written, scene, label, voice)
     parts = [f"{path}  {text.format_change(source.size, size)}"]
     if label:
-        frames = text.plural(written.frames, "frame")
+        frames = plural(written.frames, "frame")
         parts.append(f"{label}, {frames} at {written.fps:g} fps, max {text.format_length(written.error.distance)}")
     parts.append(text.format_duration(time.perf_counter() - began))
     voice.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))

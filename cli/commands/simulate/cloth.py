@@ -25,7 +25,7 @@ from anim.simulation.cloth.simulate import ClothRun, simulate_cloth
 from anim.simulation.cloth.solver import Environment
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import describe_elongation
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli import text, units
 from cli.errors import CheckError, UsageError
 from cli.io import cache_files, documents, scenes
@@ -224,7 +224,7 @@ def _summary(run: ClothRun, substeps: int) -> str:
     worst = run.report.worst_stretch or {}
     chosen = " (chosen for --max-stretch)" if figures["substeps"] != substeps else ""
     parts = [
-        f"{text.plural(run.cache.frame_count, 'frame')} of {figures['points']} points ({figures['pinned']} pinned)",
+        f"{plural(run.cache.frame_count, 'frame')} of {figures['points']} points ({figures['pinned']} pinned)",
         f"{figures['solver']}, steps of 1/{1 / run.report.step_s:g} s{chosen}",
         _stretch(worst),
     ]

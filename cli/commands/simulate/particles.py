@@ -24,7 +24,7 @@ from anim.simulation.particles.simulate import ParticleRun, add_particles, simul
 from anim.simulation.particles.solver import Contact
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
-from anim.units import is_zero_angle
+from anim.units import is_zero_angle, plural
 from cli import text, units
 from cli.options import common, simulation
 from cli.options.simulation import parse_seconds, parse_vector
@@ -243,9 +243,9 @@ def command(
 def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
     figures = report.figures
     parts = [
-        text.plural(figures["particles"], "particle"),
-        *([text.plural(figures["nodes"], "node")] if has_nodes else []),
-        text.plural(figures["impacts"], "impact"),
+        plural(figures["particles"], "particle"),
+        *([plural(figures["nodes"], "node")] if has_nodes else []),
+        plural(figures["impacts"], "impact"),
         f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
     ]
     if report.error_estimate_m and report.error_estimate_m > ROUNDING_M:
@@ -262,7 +262,7 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
 def _rigid_colliders(document: Document, scene: Scene, voice: Reporter) -> list[Obstacle]:
     found, others = read_rigid_colliders(document, scene.skeleton)
     if others:
-        more = f" and {text.plural(len(others) - 1, 'other node')}" if len(others) > 1 else ""
+        more = f" and {plural(len(others) - 1, 'other node')}" if len(others) > 1 else ""
         voice.warn(
             f"the collider of {scene.skeleton.label(others[0])}{more} is no sphere, box, capsule or plane: left out"
         )

@@ -22,6 +22,7 @@ from anim.simulation.rigid_bodies.simulate import (
     read_description,
     simulate_rigid_bodies,
 )
+from anim.units import plural
 from cli import text, units
 from cli.errors import UsageError
 from cli.options import common, simulation
@@ -100,7 +101,7 @@ def command(
         description = read_description(document, scene.skeleton)
         bodies, without_mesh = split_by_mesh(scene, _nodes(scene, body))
         if without_mesh:
-            names = text.plural(len(without_mesh), "node")
+            names = plural(len(without_mesh), "node")
             voice.info(f"note: {names} of --body without a mesh of their own are no bodies")
         chosen = ChosenNodes(
             bodies,
@@ -147,12 +148,12 @@ def _summary(report: SimulationReport) -> str:
     figures = report.figures
     parts = [
         f"{figures['bodies']} {'body' if figures['bodies'] == 1 else 'bodies'}",
-        text.plural(figures["impacts"], "impact"),
-        text.plural(figures["keys"], "key"),
+        plural(figures["impacts"], "impact"),
+        plural(figures["keys"], "key"),
         f"{report.duration_s:g} s in steps of 1/{1 / report.step_s:g} s",
     ]
     if report.loop_seam_m is not None:
-        rounds, seam = text.plural(figures["loop_rounds"], "round"), text.format_length(report.loop_seam_m)
+        rounds, seam = plural(figures["loop_rounds"], "round"), text.format_length(report.loop_seam_m)
         settled = report.loop_seam_m < SETTLED_M
         parts.append(
             f"loop after {rounds}, seam {seam}" if settled else f"no loop after {rounds}: a seam of {seam} is blended"

@@ -30,7 +30,7 @@ from anim.simulation.spring_bones.read import read_spring_bones
 from anim.simulation.spring_bones.reduction import reduce_keys
 from anim.simulation.spring_bones.report import make_report, report_divergence, step_error
 from anim.simulation.spring_bones.simulate import SpringOptions, SpringResult, simulate_springs
-from anim.units import format_number
+from anim.units import format_number, plural
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import documents
@@ -218,7 +218,7 @@ def _notes(result: SpringResult, skeleton: Skeleton, options: SpringOptions) -> 
     yield from result.notes
     if result.replaced:
         first, more = skeleton.label(result.replaced[0]), len(result.replaced) - 1
-        others = f" and of {text.plural(more, 'other joint')}" if more else ""
+        others = f" and of {plural(more, 'other joint')}" if more else ""
         yield f"the rotation track of {first}{others} is replaced"
     if abs(result.step - options.step) > 1e-9 * options.step:
         yield f"the step is 1/{1 / result.step:.4g} s, so that {result.num_steps} steps are the loop"
@@ -249,9 +249,9 @@ def _written(document: Document, clip: Clip, number: int | None) -> Document:
 
 def _summary(report: SimulationReport, result: SpringResult) -> str:
     parts = [
-        text.plural(report.figures["chains"], "chain"),
-        text.plural(report.figures["joints"], "joint"),
-        text.plural(report.figures["colliders"], "collider"),
+        plural(report.figures["chains"], "chain"),
+        plural(report.figures["joints"], "joint"),
+        plural(report.figures["colliders"], "collider"),
         f"{report.duration_s:.4g} s in steps of 1/{1 / report.step_s:.4g} s",
         f"largest rotation {format_number(report.figures['max_rotation_deg'], 2)}°",
     ]

@@ -10,11 +10,12 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
+from anim.units import plural
 from cli import errors
 from cli.errors import run_guarded
 from cli.progress import Progress
 from cli.streams import StepStreams, use_streams
-from cli.text import Reporter, format_change, format_duration, plural
+from cli.text import Reporter, format_change, format_duration
 from cli.workflows.run.cache import FileHashes, ResultCache, recipe_key, result_key
 from cli.workflows.run.cluster import Cluster
 from cli.workflows.run.job import (
