@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import http.server
 import secrets
+import threading
 import time
 import webbrowser
 from collections.abc import Callable
 
 MAX_WAIT_S = 20.0  # for a browser to fetch the page
+POLL_S = 0.2
 PATH_BYTES = 16  # random, so that other programs of the machine can't guess the address
 
 
@@ -40,10 +42,12 @@ def show_once(page: bytes, *, open_url: Callable[[str], object] = webbrowser.ope
             """Write nothing: stderr is for messages."""
 
     with http.server.HTTPServer(("127.0.0.1", 0), Once) as server:
-        if not open_url(f"http://127.0.0.1:{server.server_port}{path}"):
-            return False
+        address = f"http://127.0.0.1:{server.server_port}{path}"
+        opened: list[object] = []
+        # Beside the server: some commands in $BROWSER end with the browser only
+        threading.Thread(target=lambda: opened.append(open_url(address)), daemon=True).start()
         end = time.monotonic() + wait
-        while not served and (left := end - time.monotonic()) > 0:  # a favicon may be asked for first
-            server.timeout = left
-            server.handle_request()
+        while not served and (not opened or opened[0]) and (left := end - time.monotonic()) > 0:
+            server.timeout = min(left, POLL_S)
+            server.handle_request()  # a favicon may be asked for first
     return bool(served)

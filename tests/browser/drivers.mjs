@@ -36,7 +36,7 @@ async function launchChromium({ library, executable }) {
   const browser = await chromium.launch({ executablePath: executable, args: CHROMIUM_ARGS });
   return {
     async open(file, hash, isPhone) {
-      const device = isPhone ? devices["Pixel 7"] : { viewport: SIZE };
+      const device = isPhone ? { ...devices["Pixel 7"], reducedMotion: "reduce" } : { viewport: SIZE };
       const context = await browser.newContext({ ...device, offline: true });
       const page = await context.newPage();
       const words = listen(page, file, (request) => request.url());

@@ -10,6 +10,9 @@ import { launch } from "./drivers.mjs";
 const { engine, library, executable, shots, files } = JSON.parse(process.argv[2]);
 const READY_MS = 60000;
 const READY = "document.documentElement.dataset.ready || document.documentElement.dataset.error || ''";
+// What a link to the page shows
+const STATE = `(({ clip, node, show, side, unit, speed, loop, heatScale }) => JSON.stringify(
+  [clip, node, [...show].sort(), side, unit, speed, loop, heatScale.toPrecision(6)]))(player.state)`;
 const NO_ENGINE = 3; // exit code
 const browser = await launch(engine, { library, executable }).catch((error) => leave(error.stack ?? error));
 
@@ -35,6 +38,7 @@ async function open(file, hash, isPhone = false) {
 
 async function tryDesktop(file, faults) {
   const { page, ms } = await open(file, "#t=0&show=");
+  const { words } = page;
   const expect = (isTrue, fault) => isTrue || faults.push(fault);
   const get = page.run;
   const near = async (expected, what) => {
@@ -120,9 +124,17 @@ async function tryDesktop(file, faults) {
       player.follow(link);
       return {clip: link.clip, time: link.time, error: player.worst().error};
     }))(JSON.parse(document.getElementById("facts").textContent))`);
-  await until(page, `location.hash.includes("theme=dark")`);
+  await until(page, "location.hash === player.address()");
+  const hash = await get("location.hash");
+  const [shown, time] = [await get(STATE), await get("player.state.time")];
   await page.close();
-  return { words: page.words, ready_ms: ms, worst };
+  const again = await open(file, hash);
+  expect((await again.page.run(STATE)) === shown, `not the same from its address: ${hash}`);
+  const there = await again.page.run("player.state.time");
+  expect(Math.abs(there - time) < 1e-3, `at ${there} s instead of ${time} s from its address`);
+  words.push(...again.page.words);
+  await again.page.close();
+  return { words, ready_ms: ms, worst };
 }
 
 /** Keep a picture of the page in the middle of its first clip, or at its largest error. */
@@ -139,6 +151,7 @@ async function tryPhone(file, faults) {
   const { page } = await open(file, "", true);
   const expect = (isTrue, fault) => isTrue || faults.push(`phone: ${fault}`);
   const get = page.run;
+  expect(!(await get("player.state.playing")), "moves under reduced motion");
   await page.click("#menu");
   const clips = await get(`document.querySelectorAll("[data-clip]").length`);
   if (clips) {

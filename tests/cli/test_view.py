@@ -169,6 +169,16 @@ def test_one_answer_on_the_loopback_and_no_second() -> None:
     assert got == [404, b"<p>page"]
 
 
+def test_a_command_that_ends_with_the_browser() -> None:
+    """The page is answered while the command that opens it still runs."""
+
+    def visit(address: str) -> bool:
+        with urllib.request.urlopen(address, timeout=10) as answer:
+            return bool(answer.read())
+
+    assert browser.show_once(b"<p>page", open_url=visit)
+
+
 def test_without_a_browser_it_ends() -> None:
     assert not browser.show_once(b"", open_url=lambda _: False)
     assert not browser.show_once(b"", open_url=lambda _: True, wait=0.05)

@@ -3,7 +3,7 @@
 import { $ } from "./dom.js";
 import { openSheet } from "./keyboard.js";
 import { scrollToClip } from "./sidebar.js";
-import { LOOPS, SIDES, SPEEDS, cycle, state, toggleShow, update } from "./state.js";
+import { LOOPS, SIDES, SPEEDS, UNITS, cycle, state, toggleShow, update } from "./state.js";
 
 const STEP_S = 1 / 30;
 
@@ -38,7 +38,7 @@ export function bindings(player) {
     { keys: ["o"], label: "onion skins", run: () => toggleShow("onion") },
     { keys: ["c"], label: "clay", run: () => toggleShow("clay") },
     { keys: ["g"], label: "curves of the chosen node", run: () => toggleShow("curves") },
-    { keys: ["u"], label: "rotation as degrees from rest, or values", run: () => cycle("unit", ["degrees", "values"]) },
+    { keys: ["u"], label: "rotation as degrees from rest, or values", run: () => cycle("unit", UNITS) },
     { keys: ["h"], label: "heat of the error", run: () => toggleShow("heat"), isShown: isPair },
     {
       keys: ["[", "]"],

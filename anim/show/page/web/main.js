@@ -11,7 +11,7 @@ import { listenToKeys, openSheet } from "./keyboard.js";
 import { Player } from "./player.js";
 import { fillSidebar, markClip, markNode } from "./sidebar.js";
 import { Side } from "./side.js";
-import { SHOWS, SIDES, cycle, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
+import { SHOWS, SIDES, UNITS, cycle, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
 
 /** Bring the page in line with what changed. */
 function render(player, changed) {
@@ -60,6 +60,10 @@ function hashOf(player) {
     show: [...state.show].join(","),
     side: state.side === "both" ? null : state.side,
     theme: state.theme === "auto" ? null : state.theme,
+    unit: state.unit === "degrees" ? null : state.unit,
+    speed: state.speed === 1 ? null : state.speed,
+    loop: state.loop === "loop" ? null : state.loop,
+    scale: state.heatScale === player.ownHeatScale ? null : state.heatScale,
   };
 }
 
@@ -71,7 +75,7 @@ function connect(player) {
   $("#fit").addEventListener("click", () => fit(player));
   $("#theme").addEventListener("click", () => update({ theme: isDark() ? "light" : "dark" }));
   $("#menu").addEventListener("click", () => document.body.classList.toggle("with-side"));
-  $("#unit").addEventListener("click", () => cycle("unit", ["degrees", "values"]));
+  $("#unit").addEventListener("click", () => cycle("unit", UNITS));
   $("#speed").addEventListener("change", (event) => update({ speed: Number(event.target.value) }));
   $("#loop").addEventListener("change", (event) => update({ loop: event.target.value }));
   for (const name of SHOWS) $(`#show-${name}`).addEventListener("click", () => toggleShow(name));
@@ -97,7 +101,8 @@ function begin(player) {
   const clip = side.clipNames.indexOf(asked.clip);
   const nodes = [...side.nodes.values()];
   const node = nodes.find((each) => each.name === asked.node) ?? nodes.find((each) => `#${each.index}` === asked.node);
-  update({ theme: asked.theme, side: asked.side });
+  const { theme, unit, speed, loop } = asked;
+  update({ theme, unit, speed, loop, side: asked.side });
   if (side.clips.length) player.chooseClip(Math.max(clip, 0), asked.time ?? 0);
   fit(player);
   player.resetHeatScale();
@@ -132,7 +137,8 @@ async function main() {
   begin(player);
   player.draw();
   requestAnimationFrame((now) => player.tick(now));
-  globalThis.player = Object.assign(player, { state, update }); // for scripts and tests
+  const address = () => hashText(hashOf(player));
+  globalThis.player = Object.assign(player, { state, update, address }); // for scripts and tests
   root.dataset.ready = "1";
 }
 

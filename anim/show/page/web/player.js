@@ -93,9 +93,14 @@ export class Player {
     return measure(this.pairs.spans());
   }
 
-  resetHeatScale() {
+  /** Scale of the heat that suits the clip: m that are fully red. */
+  get ownHeatScale() {
     const known = facts.errors?.[state.clip]?.max;
-    update({ heatScale: known ? roundUp(known) : roundUp(2 * this.stage.radius * HEAT_PER_DIAGONAL) });
+    return known ? roundUp(known) : roundUp(2 * this.stage.radius * HEAT_PER_DIAGONAL);
+  }
+
+  resetHeatScale() {
+    update({ heatScale: this.ownHeatScale });
   }
 
   advance(seconds) {

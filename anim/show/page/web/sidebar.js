@@ -83,8 +83,9 @@ function panelSection(panel, { follow }) {
       make("span", { class: "name" }, name),
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
     ];
-    const isLong = !others.length; // a sentence, not a table
-    const attributes = { class: `row ${isLong ? "long" : ""} ${level ?? ""}`, title: cells.join("  ") };
+    // A sentence, not a table; or a position, whose name has a line of its own
+    const shape = !others.length ? "long" : others.length > 1 && link ? "deep" : "";
+    const attributes = { class: `row ${shape} ${level ?? ""}`, title: cells.join("  ") };
     return link
       ? make("button", { ...attributes, "data-link": "", onclick: () => follow(link) }, ...parts)
       : make("div", attributes, ...parts);

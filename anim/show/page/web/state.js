@@ -3,6 +3,7 @@
 export const SHOWS = ["bones", "wire", "onion", "clay", "curves", "heat"];
 export const SIDES = ["both", "a", "b"];
 export const LOOPS = ["loop", "once", "ping-pong"];
+export const UNITS = ["degrees", "values"];
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 
 export const state = {
@@ -57,19 +58,27 @@ export function readHash(defaults) {
     show: new Set(show.filter((name) => SHOWS.includes(name))),
     side: SIDES.includes(pick("side")) ? pick("side") : "both",
     theme: ["light", "dark"].includes(pick("theme")) ? pick("theme") : "auto",
+    unit: UNITS.includes(pick("unit")) ? pick("unit") : "degrees",
+    speed: SPEEDS.includes(number("speed")) ? number("speed") : 1,
+    loop: LOOPS.includes(pick("loop")) ? pick("loop") : "loop",
     scale: number("scale"),
   };
 }
 
 let timer = 0;
 
+/** What follows the page in its URL, "#clip=…"; parameters without a value are left out. */
+export function hashText(parameters) {
+  const hash = new URLSearchParams(Object.entries(parameters).filter(([, value]) => value));
+  return `#${hash.toString().replaceAll("%2C", ",")}`;
+}
+
 /** Write the state behind the # a moment later; scrubbing would otherwise write it 60 times a second. */
 export function writeHash(parameters) {
   clearTimeout(timer);
   timer = setTimeout(() => {
-    const hash = new URLSearchParams(Object.entries(parameters()).filter(([, value]) => value));
     try {
-      history.replaceState(null, "", `#${hash.toString().replaceAll("%2C", ",")}`);
+      history.replaceState(null, "", hashText(parameters()));
     } catch {
       // a page inside a notebook has no URL of its own
     }
