@@ -73,7 +73,10 @@ def visit(files: Sequence[Path], engine: str = CHROMIUM) -> list[Visit]:
     }
     command = [*_display(engine), "node", str(SCRIPT), json.dumps(task)]
     environment = os.environ if engine == CHROMIUM else {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
-    run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False, env=environment)
+    try:
+        run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False, env=environment)
+    except subprocess.TimeoutExpired:
+        raise EngineError(f"{engine} did not end within {TIMEOUT_S} s") from None
     if run.returncode == NO_ENGINE:
         raise EngineError(run.stderr.decode(errors="replace"))
     if run.returncode:

@@ -147,7 +147,10 @@ async function launchWebkit({ library, executable }) {
         },
       };
     },
-    close: () => call("DELETE", at).catch(() => null),
+    async close() {
+      await call("DELETE", at).catch(() => null);
+      driver.kill();
+    },
   };
 }
 

@@ -185,4 +185,4 @@ for (const file of files) {
   }
 }
 await browser.close();
-process.stdout.write(JSON.stringify(found));
+process.stdout.write(JSON.stringify(found), () => process.exit(0)); // whatever a driver left running
