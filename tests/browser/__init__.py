@@ -31,7 +31,7 @@ EXECUTABLES = {CHROMIUM: ("chromium", "chromium-browser", "google-chrome"), "fir
 PACKAGES = {CHROMIUM: "playwright-core", "firefox": "puppeteer-core"}
 MINI_BROWSERS = ("usr/lib/*/webkit2gtk-4.*/MiniBrowser", "usr/libexec/webkit2gtk-4.*/MiniBrowser")
 DISPLAY = ("xvfb-run", "-a", "-s", "-screen 0 1280x900x24")
-TIMEOUT_S = 900  # for one call
+TIMEOUT_S = 1800  # for one call
 NO_ENGINE = 3  # exit code of the script
 
 

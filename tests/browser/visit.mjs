@@ -8,7 +8,7 @@ import { basename, join } from "node:path";
 import { launch } from "./drivers.mjs";
 
 const { engine, library, executable, shots, files } = JSON.parse(process.argv[2]);
-const READY_MS = 60000;
+const READY_MS = 600000; // software GL under load takes minutes for some shaders
 const READY = "document.documentElement.dataset.ready || document.documentElement.dataset.error || ''";
 // What a link to the page shows
 const STATE = `(({ clip, node, show, side, unit, speed, loop, heatScale }) => JSON.stringify(
