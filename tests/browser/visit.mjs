@@ -13,6 +13,11 @@ const READY = "document.documentElement.dataset.ready || document.documentElemen
 // What a link to the page shows
 const STATE = `(({ clip, node, show, side, unit, speed, loop, heatScale }) => JSON.stringify(
   [clip, node, [...show].sort(), side, unit, speed, loop, heatScale.toPrecision(6)]))(player.state)`;
+const PIN = `(() => {
+  const spot = player.stage.project(player.worst().point, player.sides[1]);
+  const [x, y] = document.querySelector("#pin").style.transform.match(/-?[\\d.]+/g).map(Number);
+  return !spot || Math.hypot(spot.x - x, spot.y - y) < 1;
+})()`;
 const NO_ENGINE = 3; // exit code
 const browser = await launch(engine, { library, executable }).catch((error) => leave(error.stack ?? error));
 
@@ -106,6 +111,11 @@ async function tryDesktop(file, faults) {
   if (await get(`document.querySelectorAll("[data-node]").length`)) {
     await page.click("[data-node]");
     expect((await get("player.state.node")) !== null, "chooses a node");
+    if (clips) {
+      await press(" ");
+      expect(await get("player.state.playing && player.state.node !== null"), "plays after a click in a list");
+      await press(" ");
+    }
   }
   if (await get("player.sides.length > 1")) {
     await press("h");
@@ -114,6 +124,7 @@ async function tryDesktop(file, faults) {
       await press("b");
       expect((await get("player.state.side")) === side, `side ${side}`);
     }
+    expect(await get(PIN), "the ring is on the worst vertex");
     const scale = await get("player.state.heatScale");
     await press("]");
     expect((await get("player.state.heatScale")) === 2 * scale, "scale of heat");

@@ -16,6 +16,7 @@ export function listenToKeys(bindings) {
     event.preventDefault();
     binding.run(event);
   });
+  addEventListener("click", releaseFocus);
   const rows = bindings
     .filter((each) => each.isShown !== false)
     .map((each) => {
@@ -23,6 +24,11 @@ export function listenToKeys(bindings) {
       return make("div", {}, make("span", {}, ...keys), each.label);
     });
   $("#keys .list").append(...rows);
+}
+
+/** Take the focus from a button that the mouse or a finger pressed, so that the space bar plays; keys keep theirs. */
+function releaseFocus(event) {
+  if (event.detail > 0) event.target.closest("button, summary")?.blur();
 }
 
 const LABELS = { " ": "space", ArrowLeft: "←", ArrowRight: "→", Home: "Home", End: "End" };

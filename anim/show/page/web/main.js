@@ -21,6 +21,7 @@ function render(player, changed) {
     markClip(state.clip);
     $("#clip-name").textContent = player.sides[0].clipNames[state.clip] ?? "";
     player.resetHeatScale();
+    player.applyMaterials();
   }
   if (has("clip", "node")) {
     markNode(state.node, new Set(player.sides[0].tracks?.keys() ?? []));

@@ -39,6 +39,12 @@ export class Player {
     return Math.max(1e-6, ...this.sides.map((side) => side.clip?.duration ?? 0));
   }
 
+  /** Whether both files play the clip; B may lack it. */
+  get isPaired() {
+    const [a, b] = this.sides;
+    return Boolean(b) && (Boolean(b.clip) || !a.clip);
+  }
+
   /** Key times of the chosen node's tracks; of all tracks if it has none. */
   get keys() {
     const [side] = this.sides;
@@ -127,34 +133,39 @@ export class Player {
 
   draw() {
     for (const side of this.sides) side.pose(state.time);
-    const heat = this.#drawHeat();
+    const worst = this.#measure();
+    const isShown = state.show.has("heat") && this.isPaired;
+    const heat = isShown && this.pairs.isEmpty ? nodeColors(this.sides, state.heatScale) : null;
     this.stage.draw((side) => {
       const { bones, onion } = this.extras[this.sides.indexOf(side)];
       onion.update(state.show.has("onion"), state.time);
       const colors = side === this.sides[1] ? heat : null;
       bones.update(state.show.has("bones"), this.stage.radius, this.#nodeIn(side), colors);
     });
+    this.#markWorst(isShown ? worst : null); // after the picture, whose camera it needs
     this.timeline.move(state.time);
     if (state.show.has("curves")) this.#drawCurves();
   }
 
-  /** Color B; return colors of nodes instead where no mesh has a counterpart. */
-  #drawHeat() {
-    const isShown = state.show.has("heat") && this.sides.length > 1;
-    const pin = $("#pin");
-    pin.hidden = true;
+  /** Largest distance in the present pose, without a mesh if unknown; colors B on the way where heat is shown. */
+  #measure() {
     if (this.sides.length < 2) return null;
-    let worst = null;
-    if (isShown && (this.isLive || !state.playing)) worst = paint(this.pairs.spans(), state.heatScale);
-    else if (!state.playing) worst = measure(this.pairs.spans());
-    $("#worst").textContent = worst?.mesh ? formatLength(worst.error) : this.pairs.isEmpty ? "other vertices" : "";
-    if (worst?.mesh && isShown) {
-      const spot = this.stage.project(worst.point, this.sides[1]);
-      pin.hidden = !spot;
-      if (spot) pin.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
-      pin.firstElementChild.textContent = formatLength(worst.error);
-    }
-    return isShown && this.pairs.isEmpty ? nodeColors(this.sides, state.heatScale) : null;
+    const isHeat = state.show.has("heat");
+    const isMeasured = this.isPaired && (!state.playing || (isHeat && this.isLive));
+    const spans = isMeasured ? this.pairs.spans() : [];
+    const worst = isHeat ? paint(spans, state.heatScale) : measure(spans);
+    const reason = !this.isPaired ? "has no such clip" : this.pairs.isEmpty ? "other vertices" : "";
+    $("#worst").textContent = worst?.mesh ? formatLength(worst.error) : reason;
+    return worst;
+  }
+
+  #markWorst(worst) {
+    const spot = worst?.mesh ? this.stage.project(worst.point, this.sides[1]) : null;
+    const pin = $("#pin");
+    pin.hidden = !spot;
+    if (!spot) return;
+    pin.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
+    pin.firstElementChild.textContent = formatLength(worst.error);
   }
 
   /** The chosen node of A in a side: the same one, or that of the same name. */
@@ -182,7 +193,7 @@ export class Player {
   }
 
   applyMaterials() {
-    const heated = new Set(state.show.has("heat") ? this.pairs.heated : []);
+    const heated = new Set(state.show.has("heat") && this.isPaired ? this.pairs.heated : []);
     for (const side of this.sides) applyMaterials(side, state.show, heated);
   }
 
