@@ -1,7 +1,7 @@
 """Fixtures for all tests: real files of others, which lie beside the repository or not at all.
 
 The gate tries the same random examples each time and has no deadlines: a loaded machine changes nothing. Others are
-tried with `--hypothesis-profile default`.
+tried by `make fuzz`.
 """
 
 from __future__ import annotations

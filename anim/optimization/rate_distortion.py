@@ -42,7 +42,7 @@ def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], Rat
     Bounds go up to a tenth of the diagonal. Sizes decrease with the bound's logarithm except for the noise of the
     search, a few percent: the bound is interpolated between the nearest ones that are too small and large enough, and
     the interval between them is bisected where that did not halve it. Stops within LOG_BOUND_TOLERANCE of the smallest
-    bound, or SIZE_TOLERANCE of `max_bytes`.
+    bound, or when at most SIZE_TOLERANCE of the animation's bytes are unused.
     """
     exact = tried(0.0)
     if exact.size <= max_bytes:

@@ -292,9 +292,10 @@ def _drawn(found: DiffReport, ruler: ErrorMetric, one: _Side, other: _Side, kind
 def _left_out(drawn: int, apart: int, count: int) -> str:
     """Number of clips drawn of those that differ, and number of clips that don't."""
     shown = (
-        f"the worst {drawn} of {apart} clips that differ" if drawn < apart else f"{plural(apart, 'clip')} that differ"
+        f"the worst {drawn} of {apart} clips that differ"
+        if drawn < apart
+        else f"{plural(apart, 'clip')} that differ{'s' if apart == 1 else ''}"
     )
-    shown = shown.replace("clip that differ", "clip that differs")
     return f"{shown}, {count - apart} without difference" if count > apart else shown
 
 

@@ -106,9 +106,8 @@ class _Closing:
         self._blend = blend
         self._path = "stdin" if path == documents.PIPE else path
         self._skin: SkinMotion | None = None
-        self._done: dict[
-            bytes, tuple[Clip, Clip | UsageError]
-        ] = {}  # of clips with equal tracks the first, and its result
+        # The first of clips with equal tracks, and its result
+        self._done: dict[bytes, tuple[Clip, Clip | UsageError]] = {}
         self._problems: list[str] = []
         self._poses: list[str] = []
 

@@ -105,7 +105,8 @@ def command(
     if not dry_run:
         documents.write_text(data.decode(), output)
     if num_bound:
-        resting = f"{plural(num_bound, 'joint')} rest elsewhere in the file than the skin was bound"
+        verb = "rests" if num_bound == 1 else "rest"
+        resting = f"{plural(num_bound, 'joint')} {verb} elsewhere in the file than the skin was bound"
         voice.warn(f"{resting}: the bind pose is the rest of these curves")
     for note in motion.notes:
         voice.warn(note)

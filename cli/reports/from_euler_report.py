@@ -50,7 +50,8 @@ def warnings(made: ConversionReport) -> Iterator[str]:
     if made.is_guess:
         yield f"scale: {made.scale_words}"
     if made.onto is not None and made.onto.num_bound:
-        moved = f"{plural(made.onto.num_bound, 'joint')} of the character rest elsewhere than its skin was bound"
+        verb = "rests" if made.onto.num_bound == 1 else "rest"
+        moved = f"{plural(made.onto.num_bound, 'joint')} of the character {verb} elsewhere than its skin was bound"
         yield f"{moved}: that pose is taken for the rest"
     if made.onto is not None:
         yield from _guesses(made.onto)

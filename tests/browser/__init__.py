@@ -76,7 +76,7 @@ def visit(files: Sequence[Path], engine: str = CHROMIUM) -> list[Visit]:
     try:
         run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False, env=environment)
     except subprocess.TimeoutExpired:
-        raise EngineError(f"{engine} did not end within {TIMEOUT_S} s") from None
+        raise RuntimeError(f"{engine} did not end within {TIMEOUT_S} s") from None
     if run.returncode == NO_ENGINE:
         raise EngineError(run.stderr.decode(errors="replace"))
     if run.returncode:
@@ -133,11 +133,6 @@ def executable(engine: str = CHROMIUM) -> str | None:
         found = (each for pattern in MINI_BROWSERS for each in sorted(Path("/").glob(pattern)))
         return next(map(str, found), None)
     return next(filter(None, map(shutil.which, EXECUTABLES[engine])), None)
-
-
-def chromium() -> str | None:
-    """Return the path of Chromium, None where it is absent."""
-    return executable(CHROMIUM)
 
 
 def _display(engine: str) -> tuple[str, ...]:

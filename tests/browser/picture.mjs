@@ -6,18 +6,10 @@ import { createReadStream, existsSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { dirname, extname, join, normalize } from "node:path";
 import { pathToFileURL } from "node:url";
+import { CHROMIUM_ARGS } from "./drivers.mjs";
 
 const [playwright, executablePath, three, task] = process.argv.slice(2);
 const { chromium } = (await import(pathToFileURL(join(playwright, "index.js")))).default;
-const ARGS = [
-  "--no-sandbox",
-  "--use-angle=swiftshader",
-  "--enable-unsafe-swiftshader",
-  "--disable-background-networking",
-  "--disable-component-update",
-  "--disable-sync",
-  "--no-first-run",
-];
 const TYPES = { ".js": "text/javascript", ".html": "text/html" };
 const PAGE = `<!doctype html><body style="margin:0"><script type="importmap">
 {"imports": {"three": "/three/build/three.module.js", "three/addons/": "/three/examples/jsm/"}}</script>
@@ -64,7 +56,7 @@ const server = createServer((request, response) => {
   createReadStream(file).pipe(response);
 });
 await new Promise((done) => server.listen(0, "127.0.0.1", done));
-const browser = await chromium.launch({ executablePath, args: ARGS });
+const browser = await chromium.launch({ executablePath, args: CHROMIUM_ARGS });
 const words = [];
 try {
   const page = await browser.newPage({ viewport: { width: 512, height: 512 } });

@@ -91,7 +91,7 @@ def test_godot_reads_two_sets(call: Call, source: Path) -> None:
     assert "does not apply" in refusal(call("convert-cache", source.with_name("a.exr"), "-", "--onto", source), 2)
 
 
-def test_unity_surely_reads_two_sets(call: Call, source: Path) -> None:
+def test_a_look_up_in_the_third_set_is_noted_for_unity(call: Call, source: Path) -> None:
     bake = ("bake", source, source.with_name("a.png"), "--clip", "bend", "--preset", "unity")
     words = "note: the look-up is in set 2 (from 0 on)"
     assert words in call(*bake).err

@@ -14,7 +14,7 @@ from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.skinning.bake import prepare_bake
 from tests import judge
-from tests.browser import ROOT, TIMEOUT_S, chromium, missing_browser, package
+from tests.browser import ROOT, TIMEOUT_S, executable, missing_browser, package
 from tests.cli.conftest import Call, Find
 from tests.files import glb_of, opened, opened_path
 from tests.judge import needs_judge
@@ -42,7 +42,7 @@ def pictures(jobs: list[dict[str, Any]], folder: Path) -> list[Floats]:
     from PIL import Image
 
     told = [{**job, "file": str(job["file"]), "out": str(folder / f"{i}.png")} for i, job in enumerate(jobs)]
-    command = ["node", str(SCRIPT), str(package()), str(chromium()), str(judge.package()), json.dumps(told)]
+    command = ["node", str(SCRIPT), str(package()), str(executable()), str(judge.package()), json.dumps(told)]
     run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
     assert run.returncode == 0, run.stderr.decode(errors="replace")
     faults = [each for each in json.loads(run.stdout)["words"] if each.startswith("error") and "404" not in each]

@@ -63,7 +63,7 @@ def test_the_largest_error_is_that_of_diff(name: str, asset: Find, call: Call, t
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", OTHER_ENGINES)
 def test_another_engine(engine: str, asset: Find, call: Call, tmp_path: Path) -> None:
-    """Every key, no console message, and the error of `diff`, in Firefox and WebKit."""
+    """Every key, no request, and the error of `diff`; in Firefox no console message either."""
     if reason := missing(engine):
         pytest.skip(reason)
     try:
@@ -98,6 +98,7 @@ def test_heat_of_a_bake(asset: Find, call: Call, tmp_path: Path) -> None:
         args = ("diff", asset("Robot.glb"), tmp_path / name, "--clip", "Robot_Wave", "--format", "json")
         reports.append(json.loads(call(*args).product()))
     for found, report in zip(visit(pages), reports, strict=True):
+        assert not found.words
         assert not found.faults
         worst = max(each["error"] for each in found.worst)
         assert worst == pytest.approx(report["max_error_m"], abs=1e-4 * report["diagonal_m"])

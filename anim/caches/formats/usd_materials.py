@@ -201,8 +201,7 @@ def bind_primitives(
         name, family = _material_name(number), UsdShade.Tokens.materialBind
         subset = UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, rows, family)
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(defined[number])
-    if numbers:
-        UsdShade.MaterialBindingAPI(mesh.GetPrim()).SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
+    UsdShade.MaterialBindingAPI(mesh.GetPrim()).SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
 
 
 def _material_name(number: int) -> str:

@@ -20,6 +20,7 @@ from anim.gltf.document import Document, Json
 from anim.model import Clip, MeshInstance, Scene
 from anim.model.track import NUM_COMPONENTS
 from anim.sampling.pose import PosedSkeleton, PoseSampler
+from anim.units import plural
 
 TIME_TOLERANCE_S = 4e-7  # s, of frames; less than half the shortest jump
 
@@ -77,8 +78,9 @@ class StageBuilder:
         for group in groups:
             self._skeleton(group)
         if self._num_scaled:
-            counted = "1 morph target is" if self._num_scaled == 1 else f"{self._num_scaled} morph targets are"
-            note(f"{counted} scaled or split in two, for weights from 0 to 1, to which Blender clamps them")
+            verb = "is" if self._num_scaled == 1 else "are"
+            scaled = f"{plural(self._num_scaled, 'morph target')} {verb} scaled or split in two"
+            note(f"{scaled}, for weights from 0 to 1, to which Blender clamps them")
 
     def _skeleton(self, group: SkeletonGroup) -> None:
         """Write a skeleton and its meshes, side by side."""

@@ -120,8 +120,8 @@ def uneven_joints(skeleton: Skeleton, bones: SpringBones) -> tuple[str, ...]:
         if np.abs(drawn).max() > 0 and angle > MIN_NOTED_ANGLE_DEG:
             sizes = " × ".join(f"{each:.4g}" for each in scale)
             notes.append(
-                f"{skeleton.label(joint.node)} has an uneven scale, {sizes}: its bone is drawn {angle:.2g}° from where "
-                "it swings, as in players"
+                f"{skeleton.label(joint.node)} has a non-uniform scale, {sizes}: its bone is drawn {angle:.2g}° from "
+                "where it swings, as in players"
             )
     return tuple(notes)
 

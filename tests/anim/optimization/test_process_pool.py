@@ -53,8 +53,7 @@ def test_none_where_there_is_nothing_to_do() -> None:
 
 UNGUARDED = """
 from anim.errors import AnimError
-from anim.optimization import process_pool as module
-from anim.optimization.process_pool import ProcessPool, process_pool
+from anim.optimization.process_pool import process_pool
 
 def size(shared, task):
     return len(shared) + task

@@ -85,7 +85,7 @@ def test_a_folded_strip_does_not_pass_through_itself() -> None:
         far = np.linalg.norm(start[:, None] - start[None], axis=2) > 0.08
         closest.append(min(np.linalg.norm(x[:, None] - x[None], axis=2)[far].min() for x in frames))
     assert closest[0] < 0.005
-    assert closest[1] > 0.015
+    assert closest[1] > 0.018
 
 
 def test_points_of_a_cloth_keep_apart_but_for_those_near_at_rest() -> None:

@@ -58,7 +58,7 @@ def test_a_joint_whose_own_scale_turns_its_bone_is_noted(scale: tuple[float, flo
         translation=[[0, 0, 0], [0, 1, 0], [1, -1, 0], DOWN],
         scale=[[1, 1, 1], scale, [1, 1, 1], [1, 1, 1]],
     )
-    words = "node 1 '1' has an uneven scale, 1 × 2 × 1: its bone is drawn 18° from where it swings, as in players"
+    words = "node 1 '1' has a non-uniform scale, 1 × 2 × 1: its bone is drawn 18° from where it swings, as in players"
     assert simulate_springs(slanted, swaying(), BONES).notes == (words,) * noted
 
 
