@@ -131,10 +131,10 @@ def _has_output(context: Any) -> bool:
 
 
 def _print_error(problem: str, hint: str) -> None:
-    voice = Reporter()  # the exit code stays the same if stderr is closed
-    voice.info(f"{PROGRAM}: {escape_control(problem)}")
+    reporter = Reporter()  # the exit code stays the same if stderr is closed
+    reporter.info(f"{PROGRAM}: {escape_control(problem)}")
     if hint:
-        voice.info(f"help: {escape_control(cut_middle(hint))}")
+        reporter.info(f"help: {escape_control(cut_middle(hint))}")
 
 
 def _print_trace() -> None:

@@ -49,11 +49,11 @@ class Progress:
             self._length = 0
 
 
-def announce_compiling(voice: Reporter) -> None:
+def announce_compiling(reporter: Reporter) -> None:
     """Report the compilation of kernels to a terminal if the user's cache folder has none yet."""
-    if voice.quiet or step_streams() is not None or sys.stderr is None or not sys.stderr.isatty():
+    if reporter.quiet or step_streams() is not None or sys.stderr is None or not sys.stderr.isatty():
         return
     from anim.skinning.kernels.jit import is_compiled
 
     if not is_compiled():
-        voice.info("compiling kernels (first run only)")
+        reporter.info("compiling kernels (first run only)")

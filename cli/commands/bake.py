@@ -109,7 +109,7 @@ def command(
     USD has the materials as UsdPreviewSurface; their images are in a .usdz, and beside a .usdc or .usda.
     The mesh of a texture keeps them too, and has its look-up in the next free set of texture coordinates.
     """
-    voice = Reporter(quiet, verbose)
+    reporter = Reporter(quiet, verbose)
     began = time.perf_counter()
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
@@ -126,14 +126,14 @@ def command(
     files.check(normals=bool(normals), tangents=bool(tangents))
     moved = {"--space mesh": space is not WORLD, "--up": up is not None, "--vertex-order": vertex_order is not None}
     check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
-    with documents.source(input, voice) as source:
+    with documents.source(input, reporter) as source:
         document = source.document
         clips = reader.clips(document)
-        scene = _read_scene(source, mesh, ending, voice, normals=normals, tangents=tangents)
+        scene = _read_scene(source, mesh, ending, reporter, normals=normals, tangents=tangents)
         clip_indices = Selection(clip or ()).chosen_clips(reader.names(document))
         nodes = meshes.nodes(scene, mesh)
         baked_nodes = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
-        scenes.warn_of_other_scenes(document, source.name, voice, baked_nodes)
+        scenes.warn_of_other_scenes(document, source.name, reporter, baked_nodes)
         groups = mesh_groups(scene, nodes, output, rigid=rigid)
         jobs = bake_jobs(output, ending, groups, [(clips[i].name, i) for i in clip_indices])
         if html is not None and len(jobs) > 1:
@@ -142,33 +142,33 @@ def command(
         tangents = (mapped and normals is not False) if tangents is None else tangents
         normals = lit if normals is None else normals
         options = BakeOptions(method.value, blend, bulge_clamp, space.value, normals, tangents, rigid, fps, start, end)
-        announce_compiling(voice)
+        announce_compiling(reporter)
         bake_notes.clamped_range_note(
-            [(reader.clip_label(clips[i].name, i), clips[i]) for i in clip_indices], start, end, voice
+            [(reader.clip_label(clips[i].name, i), clips[i]) for i in clip_indices], start, end, reporter
         )
         if not rigid and not keeps_nodes(ending) and bakeable_instances(scene, nodes=nodes):
-            bake_notes.left_out_note(scene, nodes, voice)
-        run = BakeRun(source, scene, options, files, voice)
+            bake_notes.left_out_note(scene, nodes, reporter)
+        run = BakeRun(source, scene, options, files, reporter)
         for job in jobs:
             run.bake(job, groups[job.group][1], Clip("", ()) if job.clip is None else clips[job.clip])
             if len(jobs) > 1:
-                voice.verbose_info(f"  {summarize_files(run.files[-1:], method.value)}")
-    report_notes(run.files, voice)
-    normalized_keys_note({job.clip: clips[job.clip] for job in jobs if job.clip is not None}, voice)
+                reporter.verbose_info(f"  {summarize_files(run.files[-1:], method.value)}")
+    report_notes(run.files, reporter)
+    normalized_keys_note({job.clip: clips[job.clip] for job in jobs if job.clip is not None}, reporter)
     run.report_findings()
     took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
-    voice.info(f"{summarize_files(run.files, method.value)}, {took}")
+    reporter.info(f"{summarize_files(run.files, method.value)}, {took}")
     if html is not None and not dry_run:
         (baked,) = run.files
         path = str(PurePath(baked.file).with_name(baked.saved.files[-1]))
-        write_cache_page(html, input, path, [] if baked.number is None else [f"#{baked.number}"], voice)
+        write_cache_page(html, input, path, [] if baked.number is None else [f"#{baked.number}"], reporter)
 
 
 def _read_scene(
     source: Source,
     mesh: list[str] | None,
     ending: str,
-    voice: Reporter,
+    reporter: Reporter,
     *,
     normals: bool | None,
     tangents: bool | None,
@@ -178,7 +178,7 @@ def _read_scene(
     return scenes.read_scene(
         source.document,
         source.name,
-        voice,
+        reporter,
         normals=bool(normals or tangents) or (normals is None and by_default),
         tangents=bool(tangents) or (normals is not False and tangents is None and by_default),
         nodes=lambda scene: meshes.nodes(scene, mesh),

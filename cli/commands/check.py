@@ -151,11 +151,11 @@ def command(
     if known is not None and write_known is not None:
         raise UsageError("--baseline and --write-baseline can't be combined")
     expected = None if known is None else _load_baseline(known)
-    voice = Reporter(quiet)
+    reporter = Reporter(quiet)
     rules = [[word for each in option or () for word in each.split(",")] for option in (select, extend, ignore)]
     checker = FileChecker(
         RuleOptions(rules[0], rules[1], rules[2], str(target or ""), _parameters(param or ())),
-        voice,
+        reporter,
         None if config is None else check_config.read_config(config),
         fail_on,
         unsafe if fix or unsafe else None,
@@ -173,7 +173,7 @@ def command(
         kept = _unchecked(_written_baseline(write_known), checker.files, write_known)
         documents.write_text(baseline.dump(checker.found, _relative_to(write_known), kept), write_known)
         others = f", {kept.total()} kept of files that were not checked" if kept else ""
-        voice.info(f"{write_known}  {len(checker.found)} findings{others}")
+        reporter.info(f"{write_known}  {len(checker.found)} findings{others}")
         return _worst(checker.refused, len(checker.files))
     report = CheckReport(checker.files, checker.found, checker.refused, checker.limits)
     if expected is not None and known is not None:

@@ -61,13 +61,13 @@ def command(
     another method preserves more. Recommendations follow the table.
     """
     _check(fps, plot)
-    voice = Reporter(quiet)
+    reporter = Reporter(quiet)
     methods = tuple(dict.fromkeys(str(each) for each in method)) if method else USUAL
     found: list[CollapseFinding] = []
-    with documents.source(input, voice) as source:
+    with documents.source(input, reporter) as source:
         document = source.document
         clips = reader.clips(document)
-        scene = scenes.read_scene(document, source.name, voice, nodes=lambda scene: meshes.nodes(scene, mesh))
+        scene = scenes.read_scene(document, source.name, reporter, nodes=lambda scene: meshes.nodes(scene, mesh))
         numbers = Selection(clip or ()).chosen_clips(reader.names(document))
         if plot is not None and not numbers:
             raise NotFoundError("there is no clip to draw")
@@ -82,9 +82,9 @@ def command(
             ]
             progress(done + 1)
         progress.close()
-    seen = CollapseReport(source.name, comparison.meshes, methods, bulge_clamp, fps, found, voice.warnings)
+    seen = CollapseReport(source.name, comparison.meshes, methods, bulge_clamp, fps, found, reporter.warnings)
     if plot is not None:
-        _draw(seen, plot, voice)
+        _draw(seen, plot, reporter)
     if format is Format.JSON:
         documents.write_text(collapse_report.as_json(seen))
     elif not quiet:
@@ -100,10 +100,10 @@ def _check(fps: float, plot: str | None) -> None:
             raise UsageError(f"{plot}: is no .png or .svg file")
 
 
-def _draw(seen: CollapseReport, plot: str, voice: Reporter) -> None:
+def _draw(seen: CollapseReport, plot: str, reporter: Reporter) -> None:
     title = PurePath(seen.name).stem + (", bulge clamp" if seen.clamped else "")
     picture = collapse_plot(
         collapse_report.worst_of_clips(seen.found), title=title, kind=PurePath(plot).suffix.lower()[1:]
     )
     documents.write_bytes([np.frombuffer(picture, np.uint8)], plot)
-    voice.info(f"{plot}  {format_bytes(len(picture))}")
+    reporter.info(f"{plot}  {format_bytes(len(picture))}")

@@ -61,7 +61,7 @@ def command(
     the skeleton, so that all players move them. The stated error is that of the farthest
     vertex, skinned by USD, at frames and keys and half-way between.
     """
-    voice = text.Reporter(quiet)
+    reporter = text.Reporter(quiet)
     if fps is not None and fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
 
@@ -71,13 +71,15 @@ def command(
 
             if embed:
                 raise UsageError("--embed does not apply to USD")
-            skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, voice=voice)
+            skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, reporter=reporter)
             return
         if clip is not None or fps is not None:
             raise UsageError(f"{'--fps' if clip is None else '--clip'} applies to USD only (.usdz, .usdc, .usda)")
-        _convert(input, output, embed=embed, dry_run=dry_run, voice=voice)
+        _convert(input, output, embed=embed, dry_run=dry_run, reporter=reporter)
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run, check=_check_extension)
+    return many_files.edit_named(
+        input, output, more or (), out, edit, reporter, dry_run=dry_run, check=_check_extension
+    )
 
 
 def _is_usd(path: str) -> bool:
@@ -89,19 +91,21 @@ def _check_extension(path: str) -> None:
         documents.check_extension(path)
 
 
-def _convert(input: str, output: str, *, embed: bool, dry_run: bool, voice: text.Reporter) -> None:
+def _convert(input: str, output: str, *, embed: bool, dry_run: bool, reporter: text.Reporter) -> None:
     began = time.perf_counter()
     if not dry_run:
         documents.check_output(output)
-    with documents.source(input, voice) as source:
+    with documents.source(input, reporter) as source:
         document = source.document
         if embed:
             record_files(*external_files(source))
             document = images.embed(document, source.folder)
-        size = documents.write(document, output, source, dry_run=dry_run, voice=voice)
+        size = documents.write(document, output, source, dry_run=dry_run, reporter=reporter)
     if not dry_run and (embed or output == documents.PIPE or not source.is_in_folder(output)):
         copied = output != documents.PIPE
         for note in image_notes.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
-            voice.info(note)
+            reporter.info(note)
     name = source.name if output == documents.PIPE else output
-    voice.info(f"{name}  {text.format_change(source.size, size)}, {text.format_duration(time.perf_counter() - began)}")
+    reporter.info(
+        f"{name}  {text.format_change(source.size, size)}, {text.format_duration(time.perf_counter() - began)}"
+    )

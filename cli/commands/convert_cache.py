@@ -86,7 +86,7 @@ def command(
     Textures (.exr, .png) get a companion JSON file and mesh. A pipe carries one file: no textures, and only one frame
     of a sequence. Meshes of a USD may move by points, transforms, skeletons and blend shapes.
     """
-    voice = text.Reporter(quiet)
+    reporter = text.Reporter(quiet)
     began = time.perf_counter()
     for name, rate in (("--fps", fps), ("--input-fps", input_fps)):
         if rate is not None and rate <= 0:
@@ -113,12 +113,12 @@ def command(
         if input_fps and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--input-fps does not apply to {loaded.ending}, which stores its frame times")
         if loaded.ending in (".glb", ".gltf"):
-            announce_compiling(voice)
+            announce_compiling(reporter)
         cache = _changed(loaded.cache, at, fps, up, vertex_order)
         if max_error is not None:
             given["max_error"] = units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
         if onto is not None:
-            source = stack.enter_context(documents.source(onto, voice))
+            source = stack.enter_context(documents.source(onto, reporter))
             number = choose_clip(source, clip)
             cache, given["source"] = onto_source(
                 cache, source, number, keep_skeleton=keep_skeleton, output=Output(output, ending, dry_run)
@@ -131,11 +131,11 @@ def command(
             progress.close()
         size = loaded.size
     if cache.chosen:
-        voice.warn(f"{cache.chosen}; bake takes others by --clip")
+        reporter.warn(f"{cache.chosen}; bake takes others by --clip")
     for words in loaded.notes:
-        voice.warn(words)
+        reporter.warn(words)
     for note in saved.written.notes:
-        voice.info(f"note: {note}")
+        reporter.info(f"note: {note}")
     name = loaded.name if output == documents.PIPE else output
     parts = [
         f"{name}  {text.format_change(size, saved.size)}",
@@ -146,9 +146,9 @@ def command(
     if len(saved.files) > 1:
         parts.append(f"{len(saved.files)} files")
     parts.append(text.format_duration(time.perf_counter() - began))
-    voice.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
+    reporter.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
     if html is not None and not dry_run:
-        write_cache_page(html, input, str(PurePath(output).with_name(saved.files[-1])), (), voice)
+        write_cache_page(html, input, str(PurePath(output).with_name(saved.files[-1])), (), reporter)
 
 
 def _changed(

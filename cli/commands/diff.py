@@ -106,7 +106,7 @@ def command(
     players do, which differs for keys that are not of unit length. --players spec,nlerp compares one file in two
     players.
     """
-    voice, selection = Reporter(quiet), Selection(clip or ())
+    reporter, selection = Reporter(quiet), Selection(clip or ())
     who = _players(new, str(player), players)
     if old == new == documents.PIPE:
         raise UsageError("A and B can't both be stdin")
@@ -121,20 +121,20 @@ def command(
             raise UsageError("--html shows two files as glTF specifies (expected neither --player nor --players)")
     one = other = None
     if not (is_cache(old) or is_cache(new)):
-        one = _opened(old, voice)
-        other = one if new is None else _opened(new, voice)
+        one = _opened(old, reporter)
+        other = one if new is None else _opened(new, reporter)
     if new is not None and (one is None or other is None or _are_bake_and_source(one, other)):
         if plot is not None or player is not SPEC:
             raise UsageError(f"{'--plot' if plot is not None else '--player'} does not apply to caches and bakes")
         opened = {
             side.file.name: (side.document, side.file.size, side.scene) for side in (one, other) if side is not None
         }
-        found_by_vertex = diff_by_vertex(old, new, clip or (), fps, voice, opened=opened)
+        found_by_vertex = diff_by_vertex(old, new, clip or (), fps, reporter, opened=opened)
         if html is not None:
             from cli.workflows.cache_page import write_vertex_page
 
-            write_vertex_page(html, old, new, clip or (), found_by_vertex, voice)
-        _by_vertex(found_by_vertex, format, fail_above, voice, quiet=quiet)
+            write_vertex_page(html, old, new, clip or (), found_by_vertex, reporter)
+        _by_vertex(found_by_vertex, format, fail_above, reporter, quiet=quiet)
         return
     assert one is not None
     assert other is not None
@@ -146,28 +146,33 @@ def command(
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
     report = DiffReport(one.file, other.file, found, *_names(one, other), who, fps, radius, is_measured_at(one.scene))
     if report.are_strangers:
-        voice.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
+        reporter.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
     for words in _ambiguous(one.file, other.file, chosen):
-        voice.warn(words)
+        reporter.warn(words)
     for words in () if report.are_strangers else found.warnings:
-        voice.warn(f"{other.file.name}: {words}")
+        reporter.warn(f"{other.file.name}: {words}")
     if format is Format.JSON:
-        documents.write_text(diff_report.as_json(report, warnings=voice.warnings))
+        documents.write_text(diff_report.as_json(report, warnings=reporter.warnings))
     elif not quiet:
         documents.write_text(diff_report.text(report))
     if plot is not None:
         drawn = _drawn(report, ruler, one, other, kind, limit)
         documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
-        voice.info(f"{plot}  {format_bytes(len(drawn))}")
+        reporter.info(f"{plot}  {format_bytes(len(drawn))}")
     if html is not None:
         assert new is not None
-        _write_page(html, report, ruler, (old, one), (new, other), voice)
+        _write_page(html, report, ruler, (old, one), (new, other), reporter)
     if limit is not None:
         _check(report, limit)
 
 
 def _write_page(
-    path: str, report: DiffReport, ruler: ErrorMetric, one: tuple[str, _Side], other: tuple[str, _Side], voice: Reporter
+    path: str,
+    report: DiffReport,
+    ruler: ErrorMetric,
+    one: tuple[str, _Side],
+    other: tuple[str, _Side],
+    reporter: Reporter,
 ) -> None:
     """Write the page of both files, with the table of clips."""
     from anim.show.page.comparison import ClipPair, compare_content
@@ -177,7 +182,7 @@ def _write_page(
     pairs = [ClipPair(each.old, each.new, each.error, each.statistics.p99) for each in report.diff.clips]
     content = compare_content(ruler, one[1].clips, other[1].clips, pairs)
     files = [page_file(name, side.document, side.file.size) for name, side in (one, other)]
-    write_page(path, files[0], files[1], voice, content=content, view=worst_view(files[0], content))
+    write_page(path, files[0], files[1], reporter, content=content, view=worst_view(files[0], content))
 
 
 def _are_bake_and_source(one: _Side, other: _Side) -> bool:
@@ -186,10 +191,12 @@ def _are_bake_and_source(one: _Side, other: _Side) -> bool:
     return is_book or is_bake_of(one.scene, other.scene, counts[1]) or is_bake_of(other.scene, one.scene, counts[0])
 
 
-def _by_vertex(report: VertexReport, format: Format, fail_above: str | None, voice: Reporter, *, quiet: bool) -> None:
+def _by_vertex(
+    report: VertexReport, format: Format, fail_above: str | None, reporter: Reporter, *, quiet: bool
+) -> None:
     """Write the report of caches and bakes, and check the limit."""
     if format is Format.JSON:
-        documents.write_text(vertex_report.as_json(report, warnings=voice.warnings))
+        documents.write_text(vertex_report.as_json(report, warnings=reporter.warnings))
     elif not quiet:
         documents.write_text(vertex_report.text(report))
     limit = None if fail_above is None else _length(fail_above, "--fail-above", report.found.diagonal)
@@ -232,14 +239,14 @@ class _Side:
         return pages_of(self.document) is not None
 
 
-def _opened(path: str, voice: Reporter) -> _Side:
-    with documents.source(path, voice) as source:
+def _opened(path: str, reporter: Reporter) -> _Side:
+    with documents.source(path, reporter) as source:
         document = source.document
         accessors = Accessors(document)
         clips = reader.clips(document, accessors)
-        scene = scenes.read_scene(document, source.name, voice, accessors=accessors)
+        scene = scenes.read_scene(document, source.name, reporter, accessors=accessors)
         if scene.instances and reader.is_default_scene_empty(document):
-            voice.warn(f"{source.name}: the default scene has no mesh, most players show nothing")
+            reporter.warn(f"{source.name}: the default scene has no mesh, most players show nothing")
         cost = StorageCost(stored_bytes(document), storage_costs(document)[1].json)
         return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene, document)
 

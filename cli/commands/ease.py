@@ -127,7 +127,7 @@ def command(
             )
         return eased
 
-    selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
+    selection, reporter = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
 
     def edit(input: str, output: str) -> None:
         edit_clips(
@@ -135,13 +135,13 @@ def command(
             output,
             selection,
             change,
-            voice,
+            reporter,
             dry_run=dry_run,
             measure=False,
             notes=lambda before, after: _notes(before, after, easing, per),
         )
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)
 
 
 MAX_SAMPLE_SPACING_S = 0.1  # s; keys nearer than this are samples of a motion rather than poses

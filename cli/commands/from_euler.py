@@ -128,7 +128,7 @@ def command(
     formats.
     """
     began = time.perf_counter()
-    voice = text.Reporter(quiet, verbose)
+    reporter = text.Reporter(quiet, verbose)
     limit = units.parse_angle(angle_tolerance, "--angle-tolerance")
     _check(source, output, format, scale, onto, mesh, dry_run=dry_run)
     if onto is None and (alias, fail_unmatched, bind_time, replace, floor) != (*[None] * 4, GroundMode.CONTACT):
@@ -150,28 +150,31 @@ def command(
         bones = converted.skeleton
         bodies = split_by_root(bones, *stick_mesh(bones, converted.ends)) if mesh is Mesh.STICKS else []
         document = authoring.build_document(bones, [converted.clip], bodies)
-        before, size = len(data), documents.write(document, output, None, dry_run=dry_run, voice=voice)
+        before, size = len(data), documents.write(document, output, None, dry_run=dry_run, reporter=reporter)
     else:
         names = pairs(alias)
-        with documents.source(onto, voice) as character:
+        with documents.source(onto, reporter) as character:
             taken = index_of(replace, character.document)
             check_name(name, taken, character.document)
             made = named(made, character.document, name=name, replaced=taken)
             casting = CharacterOptions(names, floor, bind_time, fail_unmatched, taken)
-            made, document = put_on_character(made, character, casting, voice)
-            before, size = character.size, documents.write(document, output, character, dry_run=dry_run, voice=voice)
+            made, document = put_on_character(made, character, casting, reporter)
+            before, size = (
+                character.size,
+                documents.write(document, output, character, dry_run=dry_run, reporter=reporter),
+            )
     for each in from_euler_report.warnings(made):
-        voice.warn(each)
+        reporter.warn(each)
     if format is Format.JSON:
-        documents.write_text(from_euler_report.as_json(made, warnings=voice.warnings))
+        documents.write_text(from_euler_report.as_json(made, warnings=reporter.warnings))
     for line in from_euler_report.lines(made, verbose=verbose):
-        voice.info(line)
+        reporter.info(line)
     parts = [
         f"{called if output == documents.PIPE else output}  {text.format_change(before, size)}",
         from_euler_report.counts(made),
     ]
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.info(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
+    reporter.info(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
 
 
 def _check(

@@ -106,12 +106,12 @@ def command(
     return worst
 
 
-def _write_page(html: str, path: str, inspected: Inspected, voice: Reporter) -> None:
+def _write_page(html: str, path: str, inspected: Inspected, reporter: Reporter) -> None:
     from cli.io.page_files import open_page_file  # imports all readers of caches and curves
     from cli.io.page_output import write_page
     from cli.reports.page_panels import report_panels
 
-    write_page(html, open_page_file(path, voice), None, voice, panels=report_panels(inspected))
+    write_page(html, open_page_file(path, reporter), None, reporter, panels=report_panels(inspected))
 
 
 def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, continuity: bool) -> str:

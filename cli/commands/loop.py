@@ -76,9 +76,9 @@ def command(
     that loop best, for trim, and names the clips in which no range loops better than the whole clip.
     """
     selection = Selection(clip or ())
-    voice = Reporter(quiet, verbose)
+    reporter = Reporter(quiet, verbose)
     if output is None and blend is None:
-        _report(input, selection, voice, find=find, shortest=shortest, format=format)
+        _report(input, selection, reporter, find=find, shortest=shortest, format=format)
         return
     if find:
         raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
@@ -89,10 +89,10 @@ def command(
         output or documents.PIPE,
         selection,
         closing_of,
-        voice,
+        reporter,
         dry_run=dry_run,
         notes=closing_of.notes,
-        by_name=True,
+        every_clip=True,
     )
 
 
@@ -152,12 +152,12 @@ def _problem(found: Loop) -> str:
 
 
 def _report(
-    path: str, selection: Selection, voice: Reporter, *, find: bool, shortest: float | None, format: Format
+    path: str, selection: Selection, reporter: Reporter, *, find: bool, shortest: float | None, format: Format
 ) -> None:
-    with documents.source(path, voice) as source:
+    with documents.source(path, reporter) as source:
         clips = reader.clips(source.document)
         chosen = selection.chosen_clips(reader.names(source.document))
-        skin = _skin(source, voice)
+        skin = _skin(source, reporter)
         rows: list[tuple[str, Loop]] = []
         first = first_equal([(clips[i],) for i in chosen])
         loops: list[list[Loop]] = []
@@ -168,8 +168,8 @@ def _report(
     judged = [] if find else [(i, each) for i, (each,) in zip(chosen, loops, strict=True)]
     advised, notes = list(recommend(judged)), list(_no_better(clips, parts)) if clips else ["no clips"]
     if format is Format.JSON:
-        documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=voice.warnings))
-    elif not voice.quiet:
+        documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=reporter.warnings))
+    elif not reporter.quiet:
         lines = [f"  {line}\n" for line in (*advised, *notes)]
         documents.write_text(
             "\n".join(filter(None, (_text(rows, on_skin=skin.is_skin) if rows else "", "".join(lines))))
@@ -206,13 +206,13 @@ def _why_none(clip: Clip, parts: list[Loop]) -> str:
     return "no time range loops better than the whole clip" if is_whole else ""
 
 
-def _skin(source: Source, voice: Reporter) -> SkinMotion:
+def _skin(source: Source, reporter: Reporter) -> SkinMotion:
     """Motion on which seams are measured: nodes if vertices can't be read."""
     try:
-        return SkinMotion(scenes.read_scene(source.document, source.name, voice))
+        return SkinMotion(scenes.read_scene(source.document, source.name, reporter))
     except AnimError as error:
         hint = f" ({error.help})" if error.help else ""
-        voice.warn(f"measured at nodes, not on the skin: {error}{hint}")
+        reporter.warn(f"measured at nodes, not on the skin: {error}{hint}")
         return SkinMotion(Scene(reader.skeleton(source.document), ()))
 
 

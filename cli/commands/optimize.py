@@ -167,7 +167,7 @@ def command(
     The same command on its own output changes nothing. With another bound it starts from that output, and errors add
     up.
     """
-    voice = Reporter(quiet, verbose)
+    reporter = Reporter(quiet, verbose)
     max_count = None if max_bytes is None else optimize_job.count_of_bytes(max_bytes)
     outputs = _Outputs(report, html, curve_file, dry_run)
     outputs.check_options(out=out, max_bytes=max_bytes)
@@ -182,7 +182,7 @@ def command(
     def request(scene: Scene) -> Request:
         bounds = optimize_job.bounds(scene, lengths)
         for words in optimize_job.notes(lengths):
-            voice.warn(words)
+            reporter.warn(words)
         nodes = optimize_job.nodes_to_keep(keep_node or (), scene)
         return Request(
             bounds,
@@ -197,13 +197,18 @@ def command(
     def edit(input: str, output: str) -> None:
         began = time.perf_counter()
         outputs.check_paths(input, output)
-        with documents.source(input, voice) as source:
+        with documents.source(input, reporter) as source:
             work = optimize_job.optimize_job(
-                source, output, clip=clip or (), workers=workers, detailed=report is not None or verbose, voice=voice
+                source,
+                output,
+                clip=clip or (),
+                workers=workers,
+                detailed=report is not None or verbose,
+                reporter=reporter,
             )
             wanted = request(work.scene)
             if curve_file is not None:
-                write_curve(work, wanted, curve_file, voice, dry_run=dry_run)
+                write_curve(work, wanted, curve_file, reporter, dry_run=dry_run)
                 return
             if max_count is None:
                 found = work.run(wanted)
@@ -212,15 +217,15 @@ def command(
                 wanted, found = work.fitted(wanted, max_count, ceiling=ceiling)
             optimize_report.check(found, work.clips, wanted, work.scale)
             about = _about(work, wanted, found, began)
-            with _report(about, voice, report, dry_run=dry_run):
-                documents.write(about.after, output, source, dry_run=dry_run, voice=voice)
-        _report_result(about, voice, dry_run=dry_run)
+            with _report(about, reporter, report, dry_run=dry_run):
+                documents.write(about.after, output, source, dry_run=dry_run, reporter=reporter)
+        _report_result(about, reporter, dry_run=dry_run)
         if not dry_run:
             if html is not None:
-                _write_comparison(html, input, about, voice)
-            note_images(about.after, source, output, voice)
+                _write_comparison(html, input, about, reporter)
+            note_images(about.after, source, output, reporter)
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,16 +264,16 @@ def _about(work: OptimizeJob, request: Request, found: Optimized, began: float) 
     """Return the report on an optimization."""
     source, result = work.source, work.smaller(found)
     name = source.name if work.output == documents.PIPE else work.output
-    size, place = work.size(result), is_measured_at(work.scene)
+    size, measured_at = work.size(result), is_measured_at(work.scene)
     seconds = time.perf_counter() - began
     return optimize_report.OptimizeReport(
-        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, place
+        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, measured_at
     )
 
 
 @contextmanager
 def _report(
-    about: optimize_report.OptimizeReport, voice: Reporter, path: str | None, *, dry_run: bool
+    about: optimize_report.OptimizeReport, reporter: Reporter, path: str | None, *, dry_run: bool
 ) -> Iterator[None]:
     """Write the report around the block that writes the model: if one of them fails, neither file changes.
 
@@ -277,18 +282,18 @@ def _report(
     if path is None or (dry_run and path != documents.PIPE):
         yield
         return
-    warnings = [*voice.warnings, *optimize_report.warnings(about)]
+    warnings = [*reporter.warnings, *optimize_report.warnings(about)]
     with documents.commit_text_after(optimize_json.as_json(about, warnings=warnings), path):
         yield
 
 
-def _report_result(about: optimize_report.OptimizeReport, voice: Reporter, *, dry_run: bool) -> None:
+def _report_result(about: optimize_report.OptimizeReport, reporter: Reporter, *, dry_run: bool) -> None:
     for line in optimize_report.lines(about, dry_run=dry_run):
-        voice.info(line)
+        reporter.info(line)
     for words in optimize_report.warnings(about):
-        voice.warn(words)
-    for line in optimize_report.details(about) if voice.verbose else ():
-        voice.verbose_info(line)
+        reporter.warn(words)
+    for line in optimize_report.details(about) if reporter.verbose else ():
+        reporter.verbose_info(line)
 
 
 def _check_report(report: str, input: str, output: str) -> None:
@@ -300,10 +305,10 @@ def _check_report(report: str, input: str, output: str) -> None:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
 
-def _write_comparison(html: str, input: str, about: optimize_report.OptimizeReport, voice: Reporter) -> None:
+def _write_comparison(html: str, input: str, about: optimize_report.OptimizeReport, reporter: Reporter) -> None:
     """Write the page that compares the model before and after."""
     before = page_file(input, about.before, about.size_before)
     after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
-    content = compare_files(before, after, voice)
+    content = compare_files(before, after, reporter)
     view = worst_view(before, content)
-    write_page(html, before, after, voice, content=content, panels=size_panels(about), view=view)
+    write_page(html, before, after, reporter, content=content, panels=size_panels(about), view=view)

@@ -130,7 +130,7 @@ def command(
     Zellij, --terminal prints it in half-block characters, as wide as the terminal. --protocol names one that the
     environment does not tell, such as sixel of xterm and Windows Terminal.
     """
-    voice = Reporter(quiet)
+    reporter = Reporter(quiet)
     if ease and through is not None:
         raise UsageError("--ease and --through exclude each other")
     if tangents and through is None:
@@ -163,13 +163,13 @@ def command(
         times, values = _keys(through)
         picture = tangent_plot(times, values, tangents or ["catmull-rom"], kind=kind)
     else:
-        picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, voice)
+        picture = _tracks(source, Selection(clip or (), node or (), path or ()), view, compare, kind, limit, reporter)
     if shown is not None:
         print_picture(picture, shown, line_width=LINE_WIDTH_PX)
         return
     documents.write_bytes([np.frombuffer(picture, np.uint8)], output)
     if output != documents.PIPE:
-        voice.info(f"{output}  {format_bytes(len(picture))}")
+        reporter.info(f"{output}  {format_bytes(len(picture))}")
 
 
 def _oscillator(omega: float, step: str, kind: str) -> bytes:
@@ -225,26 +225,28 @@ def _keys(text: str) -> tuple[Floats, Floats]:
 
 
 def _tracks(
-    source: str, selection: Selection, view: str, other: str | None, kind: str, limit: int, voice: Reporter
+    source: str, selection: Selection, view: str, other: str | None, kind: str, limit: int, reporter: Reporter
 ) -> bytes:
     if limit < 1:
         raise UsageError(f"--limit is {limit} (expected 1 or more)")
     if source == other == documents.PIPE:
         raise UsageError("IN and --compare can't both be stdin")
     names = None
-    with documents.source(source, voice) as opened:
+    with documents.source(source, reporter) as opened:
         name = opened.name
         try:
             chosen = select_tracks(opened.document, selection, limit=limit, view=view)
         except NotFoundError as error:
             raise error.advise("gltf-anim inspect IN --tracks lists them") from None
     if other is not None:
-        with documents.source(other, voice) as opened:
+        with documents.source(other, reporter) as opened:
             chosen, alone = compare_selection(chosen, opened.document)
         names = Names(PurePath(name).name, PurePath(opened.name).name)
         if alone:
-            voice.info(f"note: {plural(alone, 'track')} of {name} {'is' if alone == 1 else 'are'} not in {opened.name}")
-    _report_left_out(chosen, voice)
+            reporter.info(
+                f"note: {plural(alone, 'track')} of {name} {'is' if alone == 1 else 'are'} not in {opened.name}"
+            )
+    _report_left_out(chosen, reporter)
     title = PurePath(name).stem
     clips = {each.clip for each in chosen.shown}
     title = f"{title}: {clips.pop()}" if len(clips) == 1 else title
@@ -255,9 +257,9 @@ def _count(chosen: TrackSelection) -> str:
     return f"{len(chosen.shown)} of {plural(len(chosen.shown) + chosen.more, 'track')}" if chosen.more else ""
 
 
-def _report_left_out(chosen: TrackSelection, voice: Reporter) -> None:
+def _report_left_out(chosen: TrackSelection, reporter: Reporter) -> None:
     if chosen.more:
-        voice.info(
+        reporter.info(
             f"note: drew the first {len(chosen.shown)} of {len(chosen.shown) + chosen.more} tracks that move; choose "
             "with --clip, --node and --path, or raise --limit"
         )

@@ -135,7 +135,7 @@ def command(
     Zellij, --terminal prints it in half-block characters, with fewer frames unless chosen. --protocol names one that
     the environment does not tell, such as sixel of xterm and Windows Terminal.
     """
-    voice = text.Reporter(quiet)
+    reporter = text.Reporter(quiet)
     began = time.perf_counter()
     shown = choose_protocol(asked=terminal, protocol=protocol, output=output)
     ending = _ending(output)
@@ -144,7 +144,7 @@ def command(
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
     when = FrameSelection(tuple(at or ()), count or (None if rate else _default_frames(shown)), rate, begin, end)
-    with _opened(input, voice) as (seen, name, beside):
+    with _opened(input, reporter) as (seen, name, beside):
         if isinstance(seen, VertexCache):
             given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide, "textures": textures}
             if unknown := next((name for name, value in given.items() if value), None):
@@ -155,10 +155,12 @@ def command(
             numbers = Selection(clip or ()).chosen_clips(names)[: None if clip else 1]
             if is_moving and count is not None and count > 1 and len(numbers) > 1:
                 when = _one_rate(seen, numbers, when)
-            announce_compiling(voice)
-            scene = scenes.read_scene(seen, name, voice, nodes=lambda scene: meshes.visible_meshes(scene, mesh, hide))
+            announce_compiling(reporter)
+            scene = scenes.read_scene(
+                seen, name, reporter, nodes=lambda scene: meshes.visible_meshes(scene, mesh, hide)
+            )
             nodes = meshes.visible_meshes(scene, mesh, hide)
-            scenes.warn_of_other_scenes(seen, name, voice, nodes)
+            scenes.warn_of_other_scenes(seen, name, reporter, nodes)
             found = clips.of_document(
                 seen,
                 numbers,
@@ -167,7 +169,7 @@ def command(
                 nodes=nodes,
                 textures=not (heat or checker or wire) if textures is None else textures,
                 resolve=beside,
-                note=lambda words: voice.info(f"note: {name}: {words}"),
+                note=lambda words: reporter.info(f"note: {name}: {words}"),
             )
         rows, extent = clips.build_strips(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
@@ -184,7 +186,7 @@ def command(
         print_picture(drawn, shown)
     frames = plural(len(times) if is_moving else sum(len(row.times) for row in rows), "frame")
     called = name if output == documents.PIPE else output
-    voice.info(
+    reporter.info(
         f"{called}  {text.format_bytes(len(drawn))}, {frames}, {text.format_duration(time.perf_counter() - began)}"
     )
 
@@ -207,20 +209,20 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, Resolve | None]]:
+def _opened(path: str, reporter: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, Resolve | None]]:
     """Give a glTF document or a vertex cache, its name, and the resolver of its companion files.
 
     The type follows from the file extension, for a pipe from the first bytes.
 
-    voice: reports the notes of readers.
+    reporter: reports the notes of readers.
     """
     if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) not in (".glb", ".gltf"):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
-                voice.warn(words)
+                reporter.warn(words)
             yield loaded.cache, loaded.name, None
     elif path != documents.PIPE:
-        with documents.source(path, voice) as source:
+        with documents.source(path, reporter) as source:
             beside = None if source.folder is None else resolver.CompanionFiles(source.folder).open
             yield flipbook_reader.read_pages(source.document) or source.document, source.name, beside
     else:
@@ -228,13 +230,13 @@ def _opened(path: str, voice: text.Reporter) -> Iterator[tuple[Document | Vertex
             head = data[:SIGNATURE_BYTES].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data, resolver.refuse_relative)
-                documents.repaired_note(document, name, voice)
+                documents.repaired_note(document, name, reporter)
                 yield flipbook_reader.read_pages(document) or document, name, resolver.refuse_relative
             else:
                 ending = sniff_format(head, len(data))
                 cache_files.check_pipe(name, ending)
                 reader = reader_for(ending)
-                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=voice.warn)), name, None
+                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=reporter.warn)), name, None
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) -> FrameSelection:

@@ -47,7 +47,7 @@ def command(
     """
     if not fps > 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
-    voice, selection = Reporter(quiet, verbose), Selection(clip or (), node or (), path or ())
+    reporter, selection = Reporter(quiet, verbose), Selection(clip or (), node or (), path or ())
 
     def edit(input: str, output: str) -> None:
         edit_clips(
@@ -57,8 +57,8 @@ def command(
             lambda each, tracks, _: resample(
                 each, fps=fps, interpolation=interpolation.value, snap=snap, tracks=tracks
             ),
-            voice,
+            reporter,
             dry_run=dry_run,
         )
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)

@@ -49,9 +49,9 @@ def command(
     except --warp are exact, but for the rounding of times to float32. They are applied in the order --warp, --speed or
     --duration, --reverse, --ping-pong, --offset.
     """
-    selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
+    selection, reporter = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
     if speed is None and duration is None and not (reverse or ping_pong or offset or warp_ease):
-        check_clips(input, selection, voice)
+        check_clips(input, selection, reporter)
         raise UsageError("nothing to do", help="give --speed, --duration, --reverse, --ping-pong, --warp or --offset")
     easing = parse(warp_ease) if warp_ease is not None else None
 
@@ -69,6 +69,6 @@ def command(
         )
 
     def edit(input: str, output: str) -> None:
-        edit_clips(input, output, selection, change, voice, dry_run=dry_run, measure=False)
+        edit_clips(input, output, selection, change, reporter, dry_run=dry_run, measure=False)
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)

@@ -113,7 +113,7 @@ def command(
     --scheduler needs the extra `cluster`; workers see the files under the same names. Slurm and others start dask's
     workers (dask-jobqueue). --emit prints what make, ninja or a shell can run instead, in the folder of the settings.
     """
-    voice, limit = Reporter(quiet, verbose), units.parse_size(cache_size, "--cache-size")
+    reporter, limit = Reporter(quiet, verbose), units.parse_size(cache_size, "--cache-size")
     if delete_stale and (inputs or recipe):
         raise UsageError("--delete-stale needs a run of all files and recipes", help="leave out FILE and --recipe")
     book = read_recipes(config)
@@ -124,7 +124,7 @@ def command(
         planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
     except NotFoundError:  # as after all inputs were deleted
         if is_all and emit is None:
-            _report_stale(record, (), {}, voice, delete=delete_stale)
+            _report_stale(record, (), {}, reporter, delete=delete_stale)
         raise
     if emit is not None:
         readable, code = readable_jobs(planned)
@@ -137,26 +137,28 @@ def command(
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
         journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), resume=resume))
-        run = RecipeRun(planned, journal, None if no_cache else results, voice, processes, cluster)
+        run = RecipeRun(planned, journal, None if no_cache else results, reporter, processes, cluster)
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:
-        _prune(results, limit, voice)
+        _prune(results, limit, reporter)
     if is_all:
-        _report_stale(record, run.jobs, run.written, voice, delete=delete_stale)
+        _report_stale(record, run.jobs, run.written, reporter, delete=delete_stale)
     else:
         record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written]
     return max(code, _check(written, quiet=quiet)) if check else code
 
 
-def _prune(results: caching.ResultCache, limit: int, voice: Reporter) -> None:
+def _prune(results: caching.ResultCache, limit: int, reporter: Reporter) -> None:
     count, size = prune(results, limit)
     if count:
-        voice.info(f"note: {plural(count, 'result')} ({format_bytes(size)}) deleted from the cache: see --cache-size")
+        reporter.info(
+            f"note: {plural(count, 'result')} ({format_bytes(size)}) deleted from the cache: see --cache-size"
+        )
 
 
 def _report_stale(
-    record: outputs.OutputRecord, jobs: Sequence[Job], written: Mapping[str, str], voice: Reporter, *, delete: bool
+    record: outputs.OutputRecord, jobs: Sequence[Job], written: Mapping[str, str], reporter: Reporter, *, delete: bool
 ) -> None:
     """Name outputs that no recipe makes any more, or delete them, after a run of all files and recipes."""
     stale = record.find_stale([name for job in jobs for name in (job.input, job.output)])
@@ -166,7 +168,9 @@ def _report_stale(
     if stale:
         names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
         what = "deleted" if delete else "--delete-stale deletes them"
-        voice.info(f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}")
+        reporter.info(
+            f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
+        )
 
 
 def _check(outputs: Sequence[str], *, quiet: bool) -> int:

@@ -74,12 +74,12 @@ def command(
         is_open = (cyclic or rule.loop) and open_tracks(each)
         return f"close it first: {closing_command(each, number)}" if is_open else ""
 
-    selection, voice = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
+    selection, reporter = Selection(clip or (), node or (), path or ()), Reporter(quiet, verbose)
 
     def edit(input: str, output: str) -> None:
-        edit_clips(input, output, selection, change, voice, dry_run=dry_run, notes=_notes, advise=advise)
+        edit_clips(input, output, selection, change, reporter, dry_run=dry_run, notes=_notes, advise=advise)
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)
 
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:

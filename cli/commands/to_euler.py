@@ -85,7 +85,7 @@ def command(
     contain the local transform of every node, its rest pose and its parent; from-euler reads all three.
     """
     began = time.perf_counter()
-    voice = text.Reporter(quiet)
+    reporter = text.Reporter(quiet)
     kind = _kind(output, format)
     limit = None if angle_tolerance is None else units.parse_angle(angle_tolerance, "--angle-tolerance")
     orders = _orders(order, kind)
@@ -93,7 +93,7 @@ def command(
     if output != documents.PIPE and not dry_run:
         documents.check_file(output)
     convention = Convention(DEFAULT_ORDER if orders.otherwise == AUTO else orders.otherwise, axes, unit)
-    with documents.source(input, voice) as source:
+    with documents.source(input, reporter) as source:
         chosen = _only(reader.clips(source.document), clip)
         motion, words, num_bound, deviation = _motion(
             source.document, chosen, kind, orders, axes, fps, limit, scale or DEFAULT_METERS_PER_UNIT
@@ -107,15 +107,15 @@ def command(
     if num_bound:
         verb = "rests" if num_bound == 1 else "rest"
         resting = f"{plural(num_bound, 'joint')} {verb} elsewhere in the file than the skin was bound"
-        voice.warn(f"{resting}: the bind pose is the rest of these curves")
+        reporter.warn(f"{resting}: the bind pose is the rest of these curves")
     for note in motion.notes:
-        voice.warn(note)
+        reporter.warn(note)
     if limit is None and math.degrees(deviation) > WARNED_DEVIATION_DEG:
         error = f"{format_number(math.degrees(deviation), 2)}°"
-        voice.warn(f"between keys, the curves are off by up to {error}: --angle-tolerance 0.1deg adds keys")
+        reporter.warn(f"between keys, the curves are off by up to {error}: --angle-tolerance 0.1deg adds keys")
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
-    voice.info(
+    reporter.info(
         f"{name}  {text.format_change(source.size, len(data))}, {plural(len(motion.nodes), 'node')}, "
         f"{words}{text.format_duration(time.perf_counter() - began)}{ending}"
     )

@@ -39,9 +39,9 @@ def command(
     The range keeps its times, and players show its first pose until it starts; --rebase moves the start of each clip to
     0 s. A note lists clips that are moved by different times. --rebase alone cuts nothing.
     """
-    selection, voice = Selection(clip or ()), Reporter(quiet, verbose)
+    selection, reporter = Selection(clip or ()), Reporter(quiet, verbose)
     if start is None and end is None and not rebase:
-        check_clips(input, selection, voice)
+        check_clips(input, selection, reporter)
         raise UsageError("nothing to do", help="give --from, --to or both, in seconds, or --rebase")
 
     def edit(input: str, output: str) -> None:
@@ -50,13 +50,13 @@ def command(
             output,
             selection,
             lambda each, tracks, _: trimmed(each, start=start, end=end, rebase=rebase, tracks=tracks),
-            voice,
+            reporter,
             dry_run=dry_run,
             measure=False,
             notes=lambda before, _: _moved_apart(before, start or 0.0) if rebase else (),
         )
 
-    return many_files.edit_named(input, output, more or (), out, edit, voice, dry_run=dry_run)
+    return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)
 
 
 def _moved_apart(before: Clips, start: float) -> Iterator[str]:

@@ -57,30 +57,30 @@ def command(
     Without --out the page is opened in the browser, and leaves no file. --clip, --node, --at and --show choose what is
     seen first.
     """
-    voice = Reporter(quiet)
+    reporter = Reporter(quiet)
     began = time.perf_counter()
     if input == other == documents.PIPE:
         raise UsageError("IN and B can't both be stdin")
     check_page(documents.PIPE if output is None else output)
     shows = _shows(show)
-    first = open_page_file(input, voice)
-    second = None if other is None else open_page_file(other, voice)
+    first = open_page_file(input, reporter)
+    second = None if other is None else open_page_file(other, reporter)
     view = _view(first, clip, node, at, shows)
     content = EMPTY
     if second is not None:
-        content = compare_files(first, second, voice, clip=view.clip)
+        content = compare_files(first, second, reporter, clip=view.clip)
         if view == START_VIEW:
             view = worst_view(first, content)
     made = page(first, second, title=title or "", view=view, content=content)
     if output is None:
         if not browser.show_once(made):
-            voice.warn("no browser came; -o page.html writes the page")
+            reporter.warn("no browser came; -o page.html writes the page")
         return
     documents.write_bytes([np.frombuffer(made, np.uint8)], output)
     worst = max((each.max for each in content.errors.values()), default=0.0)
     words = f", max {format_length(worst)}" if content.errors else ""
     called = input if output == documents.PIPE else output
-    voice.info(f"{called}  {format_bytes(len(made))}{words}, {format_duration(time.perf_counter() - began)}")
+    reporter.info(f"{called}  {format_bytes(len(made))}{words}, {format_duration(time.perf_counter() - began)}")
 
 
 def _shows(show: str | None) -> tuple[str, ...]:

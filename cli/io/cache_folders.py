@@ -33,11 +33,11 @@ def inputs(path: str, stack: ExitStack) -> CacheFolder:
 def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     """Return the outputs for `path` and its companion files; `away`: a folder for temporary files."""
     is_pipe = path == documents.PIPE
-    place = resolver.resolve_links(Path(path))
-    folder = Path(away) if dry_run or is_pipe else place.parent
+    target = resolver.resolve_links(Path(path))
+    folder = Path(away) if dry_run or is_pipe else target.parent
     if not dry_run and not is_pipe:
         depfile.add_output(path)
-    return AtomicOutputs(folder, "stdout" if is_pipe else place.name)
+    return AtomicOutputs(folder, "stdout" if is_pipe else target.name)
 
 
 def to_stdout(staged: AtomicOutputs) -> None:

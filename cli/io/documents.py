@@ -41,15 +41,15 @@ AUDIBLE = Reporter()
 
 
 @contextmanager
-def source(path: str, voice: Reporter = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
+def source(path: str, reporter: Reporter = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
     """Give the document at `path`, "-" for stdin; errors raised inside name the input.
 
-    voice: reports the fixes made on reading. opener: makes a document of bytes.
+    reporter: reports the fixes made on reading. opener: makes a document of bytes.
     """
     name = called(path)
     try:
         found = open_bytes(_stdin(), name, opener) if path == PIPE else _open_file(path, opener)
-        repaired_note(found.document, name, voice)
+        repaired_note(found.document, name, reporter)
         yield found
     except (UsageError, OutputError):
         raise
@@ -74,14 +74,14 @@ def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
         raise error.at(name, ": ") from None
 
 
-def repaired_note(document: Document, name: str, voice: Reporter) -> None:
+def repaired_note(document: Document, name: str, reporter: Reporter) -> None:
     """Report the fixes made on reading a document, if any. name: of the input."""
     if not document.expanded:
         return
     first, more = document.expanded[0], len(document.expanded) - 1
     words = (f" and {more} more have", "them") if more else (" has", "it")
     problem = f"{node_label(document.json, first)}{words[0]} a matrix although a clip animates {words[1]}"
-    voice.info(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
+    reporter.info(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
 
 
 def write(
@@ -91,13 +91,13 @@ def write(
     *,
     unchanged: Bytes | None = None,
     dry_run: bool = False,
-    voice: Reporter = AUDIBLE,
+    reporter: Reporter = AUDIBLE,
     in_place: bool = False,
 ) -> int:
     """Write a document to a file or, for "-", as a GLB to stdout; return its size in bytes.
 
     Files are written as by `anim.gltf.io.source.write_file`. source: the document's input. unchanged: bytes of the
-    same document (`Source.bytes_of`), written unchanged if they fit the output. voice: reports buffer files of a
+    same document (`Source.bytes_of`), written unchanged if they fit the output. reporter: reports buffer files of a
     replaced .gltf that stay. in_place: the user named no output: then that is a warning, even when quiet.
     """
     if path != PIPE:
@@ -107,7 +107,7 @@ def write(
             source,
             unchanged=unchanged,
             dry_run=dry_run,
-            note=lambda words: _report_unused(tables.escape_control(words), voice, in_place=in_place),
+            note=lambda words: _report_unused(tables.escape_control(words), reporter, in_place=in_place),
         )
     content = glb_chunks(document, unchanged)
     if not dry_run:
@@ -115,11 +115,11 @@ def write(
     return sum(len(piece) for piece in content)
 
 
-def _report_unused(words: str, voice: Reporter, *, in_place: bool) -> None:
+def _report_unused(words: str, reporter: Reporter, *, in_place: bool) -> None:
     if in_place:
-        voice.warn(words)
+        reporter.warn(words)
     else:
-        voice.info(f"note: {words}")
+        reporter.info(f"note: {words}")
 
 
 def write_bytes(pieces: Iterable[Bytes], path: str) -> None:

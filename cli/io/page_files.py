@@ -22,35 +22,35 @@ from cli.io import cache_files, documents
 from cli.text import Reporter
 
 
-def open_page_file(path: str, voice: Reporter) -> PageFile:
+def open_page_file(path: str, reporter: Reporter) -> PageFile:
     """Return the file at `path`, "-" for stdin, for a page; its format by file extension, else by its first bytes."""
     if path == documents.PIPE:
         with documents.content(path) as (data, name):
-            return _of_pipe(data, name, voice)
+            return _of_pipe(data, name, reporter)
     if of_path(path) is not None:
         with documents.content(path, ending=suffix(path)) as (data, name):
             return _converted(read_curves(data.tobytes(), name=PurePath(name).name), name, len(data))
     if suffix(path) in CACHE_FORMATS and suffix(path) not in (".glb", ".gltf"):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
-                voice.warn(words)
+                reporter.warn(words)
             return _of_cache(loaded.cache, loaded.name, loaded.size)
-    with documents.source(path, voice) as source:
+    with documents.source(path, reporter) as source:
         beside = None if source.folder is None else resolver.CompanionFiles(source.folder).open
         return _of_document(source.document, source.name, source.size, beside)
 
 
-def _of_pipe(data: Bytes, name: str, voice: Reporter) -> PageFile:
+def _of_pipe(data: Bytes, name: str, reporter: Reporter) -> PageFile:
     head = data[:SIGNATURE_BYTES].tobytes()
     if head.startswith(b"glTF") or not len(data) or _is_gltf_text(data):
         document = container.read(data, resolver.refuse_relative)
-        documents.repaired_note(document, name, voice)
+        documents.repaired_note(document, name, reporter)
         return _of_document(document, name, len(data), resolver.refuse_relative)
     if head.lstrip().upper().startswith(b"HIERARCHY") or head.lstrip()[:1] == b"{":
         return _converted(read_curves(data.tobytes()), name, len(data))
     ending = sniff_format(head, len(data))
     cache_files.check_pipe(name, ending)
-    cache = reader_for(ending)(Memory(name, {name: data.tobytes()}), ReadOptions(note=voice.warn))
+    cache = reader_for(ending)(Memory(name, {name: data.tobytes()}), ReadOptions(note=reporter.warn))
     return _of_cache(cache, name, len(data))
 
 

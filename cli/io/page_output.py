@@ -46,7 +46,7 @@ def write_page(
     path: str,
     file: PageFile,
     other: PageFile | None,
-    voice: Reporter,
+    reporter: Reporter,
     *,
     content: PageContent = EMPTY,
     panels: Sequence[PagePanel] = (),
@@ -57,4 +57,4 @@ def write_page(
     content = replace(content, panels=(*panels, *content.panels))
     made = page(file, other, title=title, view=view, content=content)
     documents.write_bytes([np.frombuffer(made, np.uint8)], path)
-    voice.info(f"{path}  {format_bytes(len(made))}")
+    reporter.info(f"{path}  {format_bytes(len(made))}")

@@ -17,7 +17,7 @@ from cli.text import Reporter
 def read_scene(
     document: Document,
     name: str,
-    voice: Reporter,
+    reporter: Reporter,
     *,
     accessors: Accessors | None = None,
     normals: bool = False,
@@ -33,39 +33,39 @@ def read_scene(
     chosen = nodes(found)
     for bad in unnormalized_weights(each for each in found.instances if chosen is None or each.node in chosen):
         for words in bad.in_words():
-            voice.warn(f"{name}: {words}")
-    _warn_of_copies(document, name, voice, chosen)
-    _warn_of_weight_pointers(document, name, voice)
+            reporter.warn(f"{name}: {words}")
+    _warn_of_copies(document, name, reporter, chosen)
+    _warn_of_weight_pointers(document, name, reporter)
     return found
 
 
-def _warn_of_weight_pointers(document: Document, name: str, voice: Reporter) -> None:
+def _warn_of_weight_pointers(document: Document, name: str, reporter: Reporter) -> None:
     pointers = weight_pointers(document.json)
     if pointers:
         more = f" and {len(pointers) - 1} more" if len(pointers) > 1 else ""
-        voice.warn(
+        reporter.warn(
             f"{name}: morph weights by the pointer '{pointers[0]}'{more} are not evaluated: what they move is in no "
             "figure, and in no bake"
         )
 
 
-def _warn_of_copies(document: Document, name: str, voice: Reporter, chosen: Collection[int] | None) -> None:
+def _warn_of_copies(document: Document, name: str, reporter: Reporter, chosen: Collection[int] | None) -> None:
     copied = [i for i in instanced_nodes(document.json) if chosen is None or i in chosen]
     if copied:
         words = f" and {len(copied) - 1} more have" if len(copied) > 1 else " has"
-        voice.warn(
+        reporter.warn(
             f"{name}: {node_label(document.json, copied[0])}{words} copies of a mesh by {INSTANCING}: "
             "one copy per node counts here, and others may move farther than is said"
         )
 
 
-def warn_of_other_scenes(document: Document, name: str, voice: Reporter, chosen: Collection[int] | None) -> None:
+def warn_of_other_scenes(document: Document, name: str, reporter: Reporter, chosen: Collection[int] | None) -> None:
     """Warn of meshes that aren't in the default scene: players don't show them. chosen: nodes, None for all."""
     other = [i for i in reader.mesh_nodes_of_other_scenes(document) if chosen is None or i in chosen]
     if other:
         label = node_label(document.json, other[0])
         subject = f"{label} and {len(other) - 1} more are" if len(other) > 1 else f"{label} is"
         meshes = "their meshes are" if len(other) > 1 else "its mesh is"
-        voice.warn(
+        reporter.warn(
             f"{name}: {subject} outside the default scene, which players show; {meshes} included (--mesh GLOB selects)"
         )

@@ -15,67 +15,67 @@ from cli import text
 from cli.text import Reporter
 
 MAX_LISTED_JOINTS = 3  # joints that a note lists
-VISIBLE_TIME_S = 1e-3  # s; smaller differences are of rounding
+MIN_TIME_DIFFERENCE_S = 1e-3  # s; smaller differences are of rounding
 VISIBLE_ERROR_PER_DIAGONAL = 1e-3  # of the diagonal; smaller errors are invisible
 
 
-def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, voice: Reporter) -> None:
+def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, reporter: Reporter) -> None:
     """Warn of vertices farther from linear blending than the size of the model.
 
     found: name and deviation of each clip.
     """
     if far := [(each, name) for name, each in found if each.distance > each.size]:
         worst, name = max(far)
-        voice.warn(
+        reporter.warn(
             f"{method} can't be used: a vertex is {text.format_length(worst.distance)} from where linear blending "
             f"(lbs), and so every player, has it, more than the model's size of {text.format_length(worst.size)}, at "
             f"{text.format_instant(worst.time)} of {name}"
         )
 
 
-def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, voice: Reporter) -> None:
+def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, reporter: Reporter) -> None:
     """Note the joints with non-uniform scale if other tools define the method differently there."""
     if joints:
         names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:MAX_LISTED_JOINTS])
         more = f" and {len(joints) - MAX_LISTED_JOINTS} more" if len(joints) > MAX_LISTED_JOINTS else ""
-        voice.info(
+        reporter.info(
             f"note: {names}{more}: non-uniform scale, for which tools define {method} differently; here each joint "
             "scales the mesh about its origin before rotating it"
         )
 
 
-def left_out_note(scene: Scene, nodes: Sequence[int] | None, voice: Reporter) -> None:
+def left_out_note(scene: Scene, nodes: Sequence[int] | None, reporter: Reporter) -> None:
     """Warn of the vertices left out because only nodes move them."""
     kept = set(bakeable_instances(scene, nodes=nodes))
     lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if each not in kept]
     if lost:
         count = sum(len(each.mesh.positions) for each in lost)
-        voice.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")
+        reporter.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")
 
 
 def clamped_range_note(
-    clips: Sequence[tuple[str, Clip]], start: float | None, end: float | None, voice: Reporter
+    clips: Sequence[tuple[str, Clip]], start: float | None, end: float | None, reporter: Reporter
 ) -> None:
     """Note the clips, by their labels, that begin after the start of a range or end before its end."""
     if start is not None:
-        late = [(name, each.start) for name, each in clips if each.start - start > VISIBLE_TIME_S]
-        _note_range("--from", start, "begins", late, voice)
+        late = [(name, each.start) for name, each in clips if each.start - start > MIN_TIME_DIFFERENCE_S]
+        _note_range("--from", start, "begins", late, reporter)
     if end is not None:
-        early = [(name, each.end) for name, each in clips if end - each.end > VISIBLE_TIME_S]
-        _note_range("--to", end, "ends", early, voice)
+        early = [(name, each.end) for name, each in clips if end - each.end > MIN_TIME_DIFFERENCE_S]
+        _note_range("--to", end, "ends", early, reporter)
 
 
-def _note_range(option: str, given: float, verb: str, found: Sequence[tuple[str, float]], voice: Reporter) -> None:
+def _note_range(option: str, given: float, verb: str, found: Sequence[tuple[str, float]], reporter: Reporter) -> None:
     if found:
         name, time = found[0]
         others = f", and {len(found) - 1} more" if len(found) > 1 else ""
-        voice.info(
+        reporter.info(
             f"note: {option} is {text.format_instant(given)}, but {name} {verb} at {text.format_instant(time)}{others}"
         )
 
 
 def frame_gap_note(
-    found: Sequence[tuple[str, InbetweenError]], rest: Floats, voice: Reporter, *, is_chosen: bool = False
+    found: Sequence[tuple[str, InbetweenError]], rest: Floats, reporter: Reporter, *, is_chosen: bool = False
 ) -> None:
     """Warn of the error of linear interpolation between frames, for the clip with the most visible one.
 
@@ -93,6 +93,6 @@ def frame_gap_note(
             f"{name}{others} (reduce with {'a higher ' if is_chosen else ''}--fps)"
         )
         if is_chosen:
-            voice.info(f"note: {words}")
+            reporter.info(f"note: {words}")
         else:
-            voice.warn(words)
+            reporter.warn(words)

@@ -28,15 +28,15 @@ class BakedFile:
     saved: SavedCache
 
 
-def report_written(done: Sequence[BakedFile], voice: Reporter, *, dry_run: bool) -> None:
+def report_written(done: Sequence[BakedFile], reporter: Reporter, *, dry_run: bool) -> None:
     """Report the files already written when a later one fails."""
     if done and not dry_run:
         names = ", ".join(each.file for each in done[:MAX_LISTED_FILES])
         more = f" and {len(done) - MAX_LISTED_FILES} more" if len(done) > MAX_LISTED_FILES else ""
-        voice.info(f"note: {plural(len(done), 'file')} written before: {names}{more}")
+        reporter.info(f"note: {plural(len(done), 'file')} written before: {names}{more}")
 
 
-def report_notes(done: Sequence[BakedFile], voice: Reporter) -> None:
+def report_notes(done: Sequence[BakedFile], reporter: Reporter) -> None:
     """Report every note once, with its files unless it applies to all."""
     files: dict[str, list[str]] = {}
     for each in done:
@@ -45,7 +45,7 @@ def report_notes(done: Sequence[BakedFile], voice: Reporter) -> None:
     for note, names in files.items():
         more = f" and {len(names) - MAX_LISTED_FILES} more" if len(names) > MAX_LISTED_FILES else ""
         where = f"{', '.join(names[:MAX_LISTED_FILES])}{more}: " if len(names) < len(done) else ""
-        voice.info(f"note: {where}{note}")
+        reporter.info(f"note: {where}{note}")
 
 
 def summarize_files(done: Sequence[BakedFile], method: str) -> str:

@@ -22,8 +22,8 @@ def describe_non_unit_keys(counts: Sequence[tuple[str, int, int]]) -> str:
     return f"{plural(num_keys, 'rotation key')} of {reader.clip_labels(found)} {words}" if found else ""
 
 
-def normalized_keys_note(clips: Mapping[int, Clip], voice: Reporter) -> None:
+def normalized_keys_note(clips: Mapping[int, Clip], reporter: Reporter) -> None:
     """Note the keys that a bake of clips, by index, normalizes."""
     counts = [(clip.name, index, sum(non_unit_keys(clip.tracks))) for index, clip in clips.items()]
     if words := describe_non_unit_keys(counts):
-        voice.info(f"note: {words}; the bake normalizes rotations, as most players do")
+        reporter.info(f"note: {words}; the bake normalizes rotations, as most players do")

@@ -126,10 +126,10 @@ def source_options(
     baked = {each.node for each in bakeable_instances(scene, rigid=options.rigid, nodes=nodes)}
     left_out = frozenset(() if nodes is None else {each.node for each in scene.instances} - baked)
     document = prepare_source(source, {source.document.json["nodes"][node]["mesh"] for node in baked}, output)
-    number, played = clip
-    if number is not None and (options.start, options.end) != (None, None) and played.end > played.start:
-        document = writer.replace_clips(document, {number: trim(played, start=options.start, end=options.end)})
-    return {"source": BakeSource(document, number, left_out, options.space == "mesh", keep_skeleton)}
+    index, played = clip
+    if index is not None and (options.start, options.end) != (None, None) and played.end > played.start:
+        document = writer.replace_clips(document, {index: trim(played, start=options.start, end=options.end)})
+    return {"source": BakeSource(document, index, left_out, options.space == "mesh", keep_skeleton)}
 
 
 def onto_source(

@@ -78,11 +78,11 @@ class BakeRun:
     """Bakes clips into files one after another, and collects findings for the notes."""
 
     def __init__(
-        self, source: Source, scene: Scene, options: BakeOptions, file_options: FileOptions, voice: Reporter
+        self, source: Source, scene: Scene, options: BakeOptions, file_options: FileOptions, reporter: Reporter
     ) -> None:
         self.files: list[BakedFile] = []
         self._source, self._scene, self._options = source, scene, options
-        self._file_options, self._voice = file_options, voice
+        self._file_options, self._reporter = file_options, reporter
         self._group: tuple[int, GroupBaker] | None = None
         self._inbetween_errors: list[tuple[str, InbetweenError]] = []
         self._deviations: list[tuple[str, Deviation]] = []
@@ -95,7 +95,7 @@ class BakeRun:
         if group.scales is not None:
             self._uneven_joints.update(group.scales.joints(clip, times))
         self._inbetween_errors.append((label, group.inbetween.largest_error(clip, times)))
-        progress = Progress(PurePath(job.file).name, len(times), shown=not self._voice.quiet)
+        progress = Progress(PurePath(job.file).name, len(times), shown=not self._reporter.quiet)
         measured = None
         if group.linear is not None:
             measured = MeasuredBake(group.baker, group.linear, clip, times, progress)
@@ -105,7 +105,7 @@ class BakeRun:
         try:
             saved = self._file_options.save(cache, job.file, source)
         except BaseException:
-            report_written(self.files, self._voice, dry_run=self._file_options.dry_run)
+            report_written(self.files, self._reporter, dry_run=self._file_options.dry_run)
             raise
         finally:
             progress.close()
@@ -118,9 +118,9 @@ class BakeRun:
         assert self._group is not None
         rest, method = self._group[1].baker.rest, self._options.method
         is_chosen = self._options.fps is not None
-        bake_notes.frame_gap_note(self._inbetween_errors, rest, self._voice, is_chosen=is_chosen)
-        bake_notes.lost_data_notes(self._deviations, method, self._voice)
-        bake_notes.uneven_scale_note(sorted(self._uneven_joints), self._scene, method, self._voice)
+        bake_notes.frame_gap_note(self._inbetween_errors, rest, self._reporter, is_chosen=is_chosen)
+        bake_notes.lost_data_notes(self._deviations, method, self._reporter)
+        bake_notes.uneven_scale_note(sorted(self._uneven_joints), self._scene, method, self._reporter)
 
     def _baker(self, index: int, nodes: Sequence[int] | None) -> GroupBaker:
         """Return the baker of a group; that of one group at a time is in memory."""

@@ -37,30 +37,30 @@ def check_cache_page(path: str | None, input: str, output: str, *, changed: Sequ
         raise UsageError(f"--html compares vertices with those of IN (expected no {changed[0]})")
 
 
-def write_cache_page(path: str, old: str, new: str, clip: Sequence[str], voice: Reporter) -> None:
+def write_cache_page(path: str, old: str, new: str, clip: Sequence[str], reporter: Reporter) -> None:
     """Write the page of two files, of which one is a cache or a bake of the other, and measure their distance.
 
     clip: globs for the clip of the glTF file.
     """
     try:
-        found = diff_by_vertex(old, new, clip, FPS, voice, opened={})
+        found = diff_by_vertex(old, new, clip, FPS, reporter, opened={})
     except AnimError as error:
-        voice.info(f"note: {path}: without errors over time: {error}")
+        reporter.info(f"note: {path}: without errors over time: {error}")
         found = None
-    write_vertex_page(path, old, new, clip, found, voice)
+    write_vertex_page(path, old, new, clip, found, reporter)
 
 
 def write_vertex_page(
-    path: str, old: str, new: str, clip: Sequence[str], found: VertexReport | None, voice: Reporter
+    path: str, old: str, new: str, clip: Sequence[str], found: VertexReport | None, reporter: Reporter
 ) -> None:
     """Write the page of two files, of which one is a cache or a bake of the other. found: their distance."""
-    one, other = open_page_file(old, voice), open_page_file(new, voice)
+    one, other = open_page_file(old, reporter), open_page_file(new, reporter)
     names = reader.names(one.document)
     chosen = Selection(tuple(clip)).chosen_clips(names) if clip and len(names) > 1 else []
     name = reader.clip_name(names[chosen[0]], chosen[0]) if len(chosen) else None
-    content = compare_files(one, other, voice, clip=name)
+    content = compare_files(one, other, reporter, clip=name)
     if found is not None and content.partners:
         index = next(iter(content.partners))
         label = " · ".join(filter(None, (reader.clip_name(names[index], index), found.mesh)))
         content = vertex_content(content, found.found, clip=index, label=label)
-    write_page(path, one, other, voice, content=content, view=worst_view(one, content))
+    write_page(path, one, other, reporter, content=content, view=worst_view(one, content))

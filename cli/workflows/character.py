@@ -42,14 +42,14 @@ class CharacterOptions:
 
 
 def put_on_character(
-    made: ConversionReport, character: Source, casting: CharacterOptions, voice: Reporter
+    made: ConversionReport, character: Source, casting: CharacterOptions, reporter: Reporter
 ) -> tuple[ConversionReport, Document]:
     """Return the conversion with its retargeting report, and the character's document with the clip.
 
     Raises CheckError if more joints than the limit are unmatched.
     """
     document = character.document
-    scene = scenes.read_scene(document, character.name, voice)
+    scene = scenes.read_scene(document, character.name, reporter)
     try:
         done = apply_to_character(
             made.converted,
@@ -61,7 +61,7 @@ def put_on_character(
             bind_time=casting.bind_time,
         )
     except NotFoundError:  # no joint is matched, or an alias names an unknown joint
-        _list_joints(made, scene, voice)
+        _list_joints(made, scene, reporter)
         raise
     left = [made.converted.skeleton.names[node] for node in done.matching.unmatched]
     if casting.fail_unmatched is not None and len(left) > casting.fail_unmatched:
@@ -75,20 +75,20 @@ def put_on_character(
         old = reader.clips(document)[casting.replaced]
         stay, num_gone = retained_tracks(old, done)
         if stay:
-            voice.info(f"note: {plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
+            reporter.info(f"note: {plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
         if num_gone:
             what = f"{plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
-            voice.warn(f"{what} go with it: it is another figure's motion")
+            reporter.warn(f"{what} go with it: it is another figure's motion")
         scaled = scaled_ancestors(done, stay, scene.skeleton)
         if scaled:
             names = ", ".join(scene.skeleton.label(node) for node in scaled)
-            voice.warn(f"the motion lacks the scale of {names} in '{old.name}': joints below get their rest size")
+            reporter.warn(f"the motion lacks the scale of {names} in '{old.name}': joints below get their rest size")
         clip = add_retained_tracks(done, stay, scene.skeleton)
         return made, writer.replace_clips(document, {casting.replaced: clip})
     return made, authoring.add_clips(document, [done.clip])
 
 
-def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
+def _list_joints(made: ConversionReport, scene: Scene, reporter: Reporter) -> None:
     """Report the names that can be paired, if details are requested."""
     moving, moved = matchable_nodes(made.converted, scene, nested=made.motion.nested)
     for what, skeleton, nodes in (
@@ -96,7 +96,7 @@ def _list_joints(made: ConversionReport, scene: Scene, voice: Reporter) -> None:
         ("character", scene.skeleton, moved),
     ):
         names = ", ".join(f"'{skeleton.names[node]}'" for node in sorted(nodes))
-        voice.verbose_info(f"joints of the {what} ({len(nodes)}): {tables.escape_control(names)}")
+        reporter.verbose_info(f"joints of the {what} ({len(nodes)}): {tables.escape_control(names)}")
 
 
 def pairs(path: str | None) -> dict[str, str]:

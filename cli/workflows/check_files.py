@@ -60,7 +60,7 @@ class FileChecker:
     """
 
     options: RuleOptions
-    voice: Reporter
+    reporter: Reporter
     config: CheckConfig | None = None
     fail_on: Severity | None = None
     unsafe: bool | None = None
@@ -128,7 +128,7 @@ class FileChecker:
         for config in self._configs.values():
             for budget in config.budgets:
                 if budget not in self._used:
-                    self.voice.warn(f"{config.path}: the budget '{budget.match}' matches no checked file")
+                    self.reporter.warn(f"{config.path}: the budget '{budget.match}' matches no checked file")
 
     def _report_faults(self, name: str, faults: Sequence[AnimError]) -> None:
         self.found += [(name, INVALID.finding([each], (), INVALID.severity)) for each in fault_occurrences(faults)]
@@ -178,15 +178,17 @@ class FileChecker:
             try:
                 result = fix_all(file, selection, unsafe=unsafe)
             except AnimError as error:
-                self.voice.warn(f"{source.name} is not fixed: {error}")
+                self.reporter.warn(f"{source.name} is not fixed: {error}")
                 return
             for each in result.refused:
                 reason = each.problem or f"a vertex would move by {format_length(each.error_m)}"
-                self.voice.warn(f"{source.name}: {each.rule.code} {each.rule.name} is not fixed: {reason}")
+                self.reporter.warn(f"{source.name}: {each.rule.code} {each.rule.name} is not fixed: {reason}")
             if result.applied:
-                documents.write(result.document, path, source, dry_run=self.dry_run, voice=self.voice, in_place=True)
+                documents.write(
+                    result.document, path, source, dry_run=self.dry_run, reporter=self.reporter, in_place=True
+                )
                 fixes = ", ".join(
                     f"{each.count} {each.rule.code} {each.rule.name} (error {format_length(each.error_m)})"
                     for each in result.applied
                 )
-                self.voice.info(f"{source.name}  fixed {fixes}{DRY if self.dry_run else ''}")
+                self.reporter.info(f"{source.name}  fixed {fixes}{DRY if self.dry_run else ''}")

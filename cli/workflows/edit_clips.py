@@ -55,13 +55,13 @@ def edit_clips(
     output: str,
     selection: Selection,
     change: Change,
-    voice: text.Reporter,
+    reporter: text.Reporter,
     *,
     dry_run: bool,
     measure: bool = True,
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
-    advise: Callable[[Clip, int], str] = lambda clip, number: "",
-    by_name: bool = False,
+    advise: Callable[[Clip, int], str] = lambda clip, index: "",
+    every_clip: bool = False,
 ) -> None:
     """Change the selected clips of one file and write it; report the result in one line on stderr.
 
@@ -69,19 +69,19 @@ def edit_clips(
     measure: compare the motion of the written file with that of the input, on the surface.
     notes: gets the changed clips, before and after, and returns notes for the user, a line each.
     advise: gets a clip that can't be changed, and its index, and returns the help of the error, or "".
-    by_name: whether `change` gets every clip; else only the first one of those with equal tracks.
+    every_clip: whether `change` gets every clip; else only the first one of those with equal tracks.
     """
     began = time.perf_counter()
     if not dry_run:
         documents.check_output(output)
-    with documents.source(path, voice) as source:
+    with documents.source(path, reporter) as source:
         document = source.document
         accessors = Accessors(document)
         clips = reader.clips(document, accessors)
         skeleton = reader.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
         scene = cache(lambda: _scene(document, accessors, skeleton))
-        first = range(len(chosen)) if by_name else first_equal([(clips[i],) for i in chosen])
+        first = range(len(chosen)) if every_clip else first_equal([(clips[i],) for i in chosen])
         new: dict[int, Clip] = {}
         for i, n in zip(chosen, first, strict=True):
             if chosen[n] in new:
@@ -94,35 +94,37 @@ def edit_clips(
         stale = badly_stored(document.json)
         new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
         for note in notes({i: clips[i] for i in new}, new):
-            voice.info(f"note: {note}")
+            reporter.info(f"note: {note}")
         result = writer.replace_clips(document, new)
         written = reader.clips(result)
         edited = EditResult({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
         if not new:
             pass
         elif measure:
-            edited = _measured(edited, source, accessors, skeleton, voice)
+            edited = _measured(edited, source, accessors, skeleton, reporter)
         else:
             for i, clip in edited.before.items():
-                voice.verbose_info(
+                reporter.verbose_info(
                     f"  {reader.clip_label(clip.name, i)}: {_keys(clip)} → {_keys(edited.after[i])} keys"
                 )
-        size = documents.write(result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run, voice=voice)
+        size = documents.write(
+            result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run, reporter=reporter
+        )
     if not dry_run:
-        note_images(result, source, output, voice)
+        note_images(result, source, output, reporter)
     name = source.name if output == documents.PIPE else output
     if not new:
         why = "no track was changed" if clips else "it has no clips"
         before = text.format_bytes(size) if size == source.size else text.format_change(source.size, size)
-        voice.info(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
+        reporter.info(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
-    voice.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
+    reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
-def check_clips(path: str, selection: Selection, voice: text.Reporter) -> None:
+def check_clips(path: str, selection: Selection, reporter: text.Reporter) -> None:
     """Raise NotFoundError for a selected clip that a file lacks, which is only then read."""
     if selection.clips:
-        with documents.source(path, voice) as source:
+        with documents.source(path, reporter) as source:
             selection.chosen_clips(reader.names(source.document))
 
 
@@ -139,29 +141,31 @@ def _is_same(new: Clip, old: Clip) -> bool:
 
 
 def _measured(
-    edited: EditResult, source: Source, accessors: Accessors, skeleton: Skeleton, voice: text.Reporter
+    edited: EditResult, source: Source, accessors: Accessors, skeleton: Skeleton, reporter: text.Reporter
 ) -> EditResult:
     at_nodes = False
     try:
-        scene = scenes.read_scene(source.document, source.name, voice, accessors=accessors)
+        scene = scenes.read_scene(source.document, source.name, reporter, accessors=accessors)
     except AnimError as error:  # unreadable vertices don't prevent a change of keys
         hint = f" ({error.help})" if error.help else ""
-        voice.warn(f"measured at nodes, not on the surface: {error}{hint}")
+        reporter.warn(f"measured at nodes, not on the surface: {error}{hint}")
         scene, at_nodes = Scene(skeleton, ()), True
     prover = Prover(ErrorMetric(scene))
     measured: list[Proof] = []
     first = first_equal([(before, edited.after[i]) for i, before in edited.before.items()])
-    _warn_of_non_unit_keys(edited, first, voice)
+    _warn_of_non_unit_keys(edited, first, reporter)
     floor = 0.0
     for n, (i, before) in enumerate(edited.before.items()):
         if first[n] < n:
             found = measured[first[n]]
         else:
-            found = largest_error(prover, before, edited.after[i], floor=0.0 if voice.verbose else floor)
+            found = largest_error(prover, before, edited.after[i], floor=0.0 if reporter.verbose else floor)
         floor = max(floor, found.error.max_error)
         measured.append(found)
         counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
-        voice.verbose_info(f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}")
+        reporter.verbose_info(
+            f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}"
+        )
     return EditResult(edited.before, edited.after, _worst(measured), prover.ruler.diagonal, at_nodes)
 
 
@@ -174,7 +178,7 @@ def _worst(measured: list[Proof]) -> Proof | None:
     return replace(worst, bound=max(bounds) if len(bounds) == len(measured) else None)
 
 
-def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], voice: text.Reporter) -> None:
+def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], reporter: text.Reporter) -> None:
     """Warn of rotations of changed tracks that are not unit quaternions: the error holds for players that normalize.
 
     first: for each clip the first one that is equal before and after.
@@ -184,7 +188,7 @@ def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], voice: text
         count = counts[first[n]][2] if first[n] < n else _changed_non_unit_keys(before, edited.after[i])
         counts.append((before.name, i, count))
     if words := describe_non_unit_keys(counts):
-        voice.warn(f"{words}; in players that don't normalize rotations the error may be larger than stated")
+        reporter.warn(f"{words}; in players that don't normalize rotations the error may be larger than stated")
 
 
 def _changed_non_unit_keys(before: Clip, after: Clip) -> int:
@@ -218,11 +222,11 @@ def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 
 
-def note_images(document: Document, source: Source, output: str, voice: text.Reporter) -> None:
+def note_images(document: Document, source: Source, output: str, reporter: text.Reporter) -> None:
     """Report the images copied to the output's folder, and the missing ones."""
     if output != documents.PIPE and not source.is_in_folder(output):
         for note in image_notes.notes(document, source.folder, copied=True):
-            voice.info(note)
+            reporter.info(note)
 
 
 def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:

@@ -30,7 +30,7 @@ def edit_named(
     more: Sequence[str],
     pattern: str | None,
     edit: Callable[[str, str], object],
-    voice: Reporter,
+    reporter: Reporter,
     *,
     dry_run: bool,
     check: Callable[[str], None] = documents.check_extension,
@@ -49,7 +49,7 @@ def edit_named(
     if not pattern:
         raise UsageError("--out has an empty name")
     names = [input, *([] if output == documents.PIPE else [output]), *more]
-    return edit_files(names, pattern, edit, voice, dry_run=dry_run, check=check)
+    return edit_files(names, pattern, edit, reporter, dry_run=dry_run, check=check)
 
 
 def refuse_folder(path: str, *, help: str) -> None:
@@ -62,7 +62,7 @@ def edit_files(
     inputs: Sequence[str],
     pattern: str,
     edit: Callable[[str, str], object],
-    voice: Reporter,
+    reporter: Reporter,
     *,
     dry_run: bool,
     check: Callable[[str], None] = documents.check_extension,
@@ -87,7 +87,7 @@ def edit_files(
             codes.append(errors.report_error(error))
     if len(pairs) > 1:
         failed = f", {len(codes)} failed" if codes else ""
-        voice.info(f"{plural(len(pairs), 'file')}{failed}")
+        reporter.info(f"{plural(len(pairs), 'file')}{failed}")
     return max(codes, default=errors.DONE)
 
 

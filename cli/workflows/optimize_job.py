@@ -116,7 +116,7 @@ def _bounded(request: Request, max_error: float) -> Request:
 
 
 def optimize_job(
-    source: Source, output: str, *, clip: Sequence[str], workers: int, detailed: bool, voice: Reporter
+    source: Source, output: str, *, clip: Sequence[str], workers: int, detailed: bool, reporter: Reporter
 ) -> OptimizeJob:
     """Return the job for a source. clip: globs. workers: processes, 0 for one per core.
 
@@ -125,7 +125,7 @@ def optimize_job(
     document = source.document
     accessors = Accessors(document)
     clips = tuple(reader.clips(document, accessors))
-    scene = scenes.read_scene(document, source.name, voice, accessors=accessors)
+    scene = scenes.read_scene(document, source.name, reporter, accessors=accessors)
     return OptimizeJob(
         source,
         clips,
@@ -135,7 +135,7 @@ def optimize_job(
         output,
         workers or _cores(),
         detailed,
-        Progress("optimize", 1000, shown=not voice.quiet),
+        Progress("optimize", 1000, shown=not reporter.quiet),
     )
 
 

@@ -16,13 +16,13 @@ from cli.text import Reporter
 from cli.workflows.vertex_motion import is_bake_of, node_pairs
 
 
-def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str | None = None) -> PageContent:
+def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: str | None = None) -> PageContent:
     """Return errors over time, where both files can be measured by joints; else the page measures vertices by itself.
 
     clip: name of the first file's clip that a bake or a cache is of.
     """
     try:
-        old, new = (read_scene(each.document, each.name, voice) for each in (one, other))
+        old, new = (read_scene(each.document, each.name, reporter) for each in (one, other))
         clips = reader.clips(one.document), reader.clips(other.document)
         is_cached = one.cache is not None or other.cache is not None
         counts = len(clips[0]), len(clips[1])
@@ -33,7 +33,7 @@ def compare_files(one: PageFile, other: PageFile, voice: Reporter, *, clip: str 
         ruler = ErrorMetric(old, new)
         return compare_content(ruler, *clips, compare_clips(ruler, *clips))
     except AnimError as error:
-        voice.info(f"note: without errors over time: {error}")
+        reporter.info(f"note: without errors over time: {error}")
         return EMPTY
 
 

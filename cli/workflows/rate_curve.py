@@ -26,12 +26,12 @@ def check_curve_file(path: str) -> None:
         raise UsageError(f"{path}: is no .csv, .png or .svg file")
 
 
-def write_curve(work: OptimizeJob, request: Request, path: str, voice: Reporter, *, dry_run: bool) -> None:
+def write_curve(work: OptimizeJob, request: Request, path: str, reporter: Reporter, *, dry_run: bool) -> None:
     """Search with one bound after another, report each size, and write the curve."""
     points = []
     bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
     for point in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
-        voice.info(_line(point, work.scale))
+        reporter.info(_line(point, work.scale))
         points.append(point)
     if dry_run:
         return

@@ -30,7 +30,7 @@ def simulate_clip(
     output: str,
     clip: str | None,
     simulate: Simulate,
-    voice: Reporter,
+    reporter: Reporter,
     *,
     report: str | None,
     dry_run: bool,
@@ -48,12 +48,12 @@ def simulate_clip(
         is_other = output != documents.PIPE and PurePath(output).suffix.lower() in others
         (documents.check_file if is_other else documents.check_output)(output)
         check_report(report)
-    with documents.source(input, voice) as source:
-        scene = scenes.read_scene(source.document, source.name, voice)
-        number = driving_clip(source.document, clip)
-        driver = NO_CLIP if number is None else reader.clips(source.document)[number]
+    with documents.source(input, reporter) as source:
+        scene = scenes.read_scene(source.document, source.name, reporter)
+        index = driving_clip(source.document, clip)
+        driver = NO_CLIP if index is None else reader.clips(source.document)[index]
         try:
-            result, found, summary = simulate(source.document, scene, driver, number)
+            result, found, summary = simulate(source.document, scene, driver, index)
         except UnstableError as error:
             if report is not None and error.report is not None and not dry_run:
                 write_report(error.report, report)
@@ -63,18 +63,18 @@ def simulate_clip(
             if not dry_run:
                 documents.write_bytes([np.frombuffer(result, np.uint8)], output)
         else:
-            size = documents.write(result, output, source, dry_run=dry_run, voice=voice)
+            size = documents.write(result, output, source, dry_run=dry_run, reporter=reporter)
     if not dry_run:
         if not isinstance(result, bytes):
-            note_images(result, source, output, voice)
+            note_images(result, source, output, reporter)
         if report is not None:
             write_report(found, report)
     name = source.name if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     nothing = " (dry run: nothing written)" if dry_run else ""
-    voice.info(f"{name}  {text.format_change(source.size, size)}, {summary}, {took}{nothing}")
+    reporter.info(f"{name}  {text.format_change(source.size, size)}, {summary}, {took}{nothing}")
     if found.advice:
-        voice.warn(found.advice)
+        reporter.warn(found.advice)
 
 
 def driving_clip(document: Document, glob: str | None) -> int | None:
@@ -90,7 +90,7 @@ def driving_clip(document: Document, glob: str | None) -> int | None:
     return chosen[0]
 
 
-def note_own_clip(name: str, driver: Clip, voice: Reporter) -> None:
+def note_own_clip(name: str, driver: Clip, reporter: Reporter) -> None:
     """Note that the motion is in a clip of its own, which players don't show first."""
     first = f"clip '{driver.name}'" if driver.name else "the driving clip"
-    voice.info(f"note: the motion is clip '{name}'; players begin with another: --merge adds it to {first}")
+    reporter.info(f"note: the motion is clip '{name}'; players begin with another: --merge adds it to {first}")

@@ -26,24 +26,24 @@ from cli.workflows.bake_jobs import bake_jobs
 
 
 def convert_to_usd(
-    input: str, output: str, *, clips: Sequence[str] | None, fps: float | None, dry_run: bool, voice: Reporter
+    input: str, output: str, *, clips: Sequence[str] | None, fps: float | None, dry_run: bool, reporter: Reporter
 ) -> None:
     """Write the document at `input` as USD, with one of its clips or a file for each."""
     if not dry_run:
         documents.check_file(output, ("clip",))
-    with documents.source(input, voice) as source:
+    with documents.source(input, reporter) as source:
         found = reader.clips(source.document)
         chosen = Selection(clips or ()).chosen_clips(reader.names(source.document))
         _check_one_clip(output, [(found[i].name, i) for i in chosen])
-        scene = scenes.read_scene(source.document, source.name, voice, normals=True)
-        scenes.warn_of_other_scenes(source.document, source.name, voice, None)
+        scene = scenes.read_scene(source.document, source.name, reporter, normals=True)
+        scenes.warn_of_other_scenes(source.document, source.name, reporter, None)
         ending = Path(output).suffix.lower()
         document = self_contained(source, {source.document.json["nodes"][i.node]["mesh"] for i in scene.instances})
         jobs = bake_jobs(output, ending, [("", None)], [(found[i].name, i) for i in chosen])
         for job in jobs:
             played = Clip("", ()) if job.clip is None else found[job.clip]
             label = "" if job.clip is None else reader.clip_label(played.name, job.clip)
-            _convert((source, document, scene), played, job.file, fps, label, voice, dry_run=dry_run)
+            _convert((source, document, scene), played, job.file, fps, label, reporter, dry_run=dry_run)
 
 
 def _check_one_clip(output: str, clips: Sequence[tuple[str, int]]) -> None:
@@ -60,7 +60,7 @@ def _convert(
     path: str,
     fps: float | None,
     label: str,
-    voice: Reporter,
+    reporter: Reporter,
     *,
     dry_run: bool,
 ) -> None:
@@ -78,22 +78,22 @@ def _convert(
         finally:
             staged.clear()
     for note in written.notes:
-        voice.info(f"note: {note}")
-    _note_error(written, scene, label, voice)
+        reporter.info(f"note: {note}")
+    _note_error(written, scene, label, reporter)
     parts = [f"{path}  {text.format_change(source.size, size)}"]
     if label:
         frames = plural(written.frames, "frame")
         parts.append(f"{label}, {frames} at {written.fps:g} fps, max {text.format_length(written.error.distance)}")
     parts.append(text.format_duration(time.perf_counter() - began))
-    voice.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
+    reporter.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
 
 
-def _note_error(written: UsdSkelResult, scene: Scene, label: str, voice: Reporter) -> None:
+def _note_error(written: UsdSkelResult, scene: Scene, label: str, reporter: Reporter) -> None:
     """Note an error that can be seen."""
     size = diagonal(scene)
     distance, time_s = written.error
     if distance > VISIBLE_ERROR_PER_DIAGONAL * size:
-        voice.info(
+        reporter.info(
             f"note: a vertex is {text.format_length(distance)}{text.format_fraction(distance, size)} from the source "
             f"at {text.format_instant(time_s)}{f' of {label}' if label else ''} (reduce with a higher --fps)"
         )

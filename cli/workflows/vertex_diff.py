@@ -48,7 +48,7 @@ def is_cache(path: str | None) -> bool:
 
 
 def diff_by_vertex(
-    old: str, new: str, clips: Sequence[str], fps: float, voice: Reporter, *, opened: Opened
+    old: str, new: str, clips: Sequence[str], fps: float, reporter: Reporter, *, opened: Opened
 ) -> VertexReport:
     """Compare two files by vertex, at all keys and frames of both, half-way between, and at `fps` per second.
 
@@ -56,8 +56,8 @@ def diff_by_vertex(
     already, with their sizes and scenes, by name.
     """
     with ExitStack() as stack:
-        one, other = (stack.enter_context(_opened(path, voice, opened)) for path in (old, new))
-        label, first, second = _motions(one, other, clips, voice)
+        one, other = (stack.enter_context(_opened(path, reporter, opened)) for path in (old, new))
+        label, first, second = _motions(one, other, clips, reporter)
         times = common_times(first, second, fps)
         found = vertex_distance(times, first.frames(times), second.frames(times), diagonal=first.diagonal())
         mesh, vertex = vertex_motion.locate(first if first.labels else second, max(found.vertex, 0))
@@ -65,23 +65,25 @@ def diff_by_vertex(
 
 
 @contextmanager
-def _opened(path: str, voice: Reporter, opened: Opened) -> Iterator[_Side]:
+def _opened(path: str, reporter: Reporter, opened: Opened) -> Iterator[_Side]:
     if is_cache(path):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
-                voice.warn(words)
+                reporter.warn(words)
             yield _Side(loaded.name, loaded.size, None, loaded.cache)
     elif documents.called(path) in opened:
         document, size, scene = opened[documents.called(path)]
         yield _Side(documents.called(path), size, document, vertex_motion.pages_of(document), scene)
     else:
-        with documents.source(path, voice) as source:
+        with documents.source(path, reporter) as source:
             cache = vertex_motion.pages_of(source.document)
-            scene = scenes.read_scene(source.document, source.name, voice)
+            scene = scenes.read_scene(source.document, source.name, reporter)
             yield _Side(source.name, source.size, source.document, cache, scene)
 
 
-def _motions(one: _Side, other: _Side, globs: Sequence[str], voice: Reporter) -> tuple[str, VertexMotion, VertexMotion]:
+def _motions(
+    one: _Side, other: _Side, globs: Sequence[str], reporter: Reporter
+) -> tuple[str, VertexMotion, VertexMotion]:
     """Name of the clip, and both motions."""
     if one.cache is not None and other.cache is not None:
         return "", cache_motion(one.cache), cache_motion(other.cache)
@@ -95,13 +97,13 @@ def _motions(one: _Side, other: _Side, globs: Sequence[str], voice: Reporter) ->
     assert one.document is not None
     assert other.document is not None
     if vertex_motion.is_bake_of(one.scene_of(), other.scene_of(), len(reader.names(other.document))):
-        return _of_documents((one, one.document), (other, other.document), globs, voice)
-    label, second, first = _of_documents((other, other.document), (one, one.document), globs, voice)
+        return _of_documents((one, one.document), (other, other.document), globs, reporter)
+    label, second, first = _of_documents((other, other.document), (one, one.document), globs, reporter)
     return label, first, second
 
 
 def _of_documents(
-    source: tuple[_Side, Document], baked: tuple[_Side, Document], globs: Sequence[str], voice: Reporter
+    source: tuple[_Side, Document], baked: tuple[_Side, Document], globs: Sequence[str], reporter: Reporter
 ) -> tuple[str, VertexMotion, VertexMotion]:
     """Name of the clip, and the motions of a source and of its bake, which has one clip."""
     (played,) = reader.clips(baked[1])[:1] or (Clip("", ()),)
@@ -110,7 +112,7 @@ def _of_documents(
     sides = ((source[0].scene_of(), clip), (baked[0].scene_of(), played))
     first, second, missing = pair_documents(*sides)
     if missing:
-        voice.warn(f"{baked[0].name}: has no mesh like {', '.join(missing)}")
+        reporter.warn(f"{baked[0].name}: has no mesh like {', '.join(missing)}")
     return clip.name, first, second
 
 

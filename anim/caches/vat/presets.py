@@ -17,7 +17,7 @@ class Preset:
     axes: indices of glTF's axes (0, 1, 2) for its x, y, z; signs: ±1 for each. per_meter: its units per metre.
     is_flipped: True if v counts from the bottom row after the engine's own loader.
     endings: extensions of lossless formats. advice: settings for the user, a line each. coordinate_sets: largest number
-    of sets of texture coordinates of a mesh. sure_sets: number of sets that its importer supports completely.
+    of sets of texture coordinates of a mesh. supported_sets: number of sets that its importer supports completely.
     """
 
     axes: tuple[int, int, int]
@@ -27,7 +27,7 @@ class Preset:
     endings: tuple[str, ...]
     advice: tuple[str, ...] = ()
     coordinate_sets: int = 8
-    sure_sets: int = 8
+    supported_sets: int = 8
 
 
 NEAREST = "nearest filter, no mipmaps, no compression, no sRGB"
@@ -41,7 +41,7 @@ PRESETS = {
     ),
     "godot": Preset((0, 1, 2), (1, 1, 1), 1.0, False, (".exr",), (f"import as lossless; {NEAREST}", LIGHTMAPS), 2),
     "unity": Preset(
-        (0, 1, 2), (-1, 1, 1), 1.0, False, (".exr", ".png"), (f"mesh through glTFast; {NEAREST}",), sure_sets=2
+        (0, 1, 2), (-1, 1, 1), 1.0, False, (".exr", ".png"), (f"mesh through glTFast; {NEAREST}",), supported_sets=2
     ),
     "unreal": Preset((0, 2, 1), (1, 1, 1), 100.0, False, (".exr", ".png"), (f"mesh through Interchange; {NEAREST}",)),
 }

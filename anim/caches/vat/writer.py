@@ -119,10 +119,11 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, ending
     with outputs.create(f"{outputs.main}.json") as file:
         file.write(metadata.text(about, engine))
     advice = engine.advice
-    if uv_set >= engine.sure_sets:
+    if uv_set >= engine.supported_sets:
         advice += (
             f"the look-up is in set {uv_set} (from 0 on) of the texture coordinates, but the importer of "
-            f"{writing.preset} supports only {engine.sure_sets} completely: test it, or remove a set from the source",
+            f"{writing.preset} supports only {engine.supported_sets} completely: test it, "
+            "or remove a set from the source",
         )
     return WriteResult(worst / engine.per_meter, (*advice, *statistics.notes(cache.times)))
 

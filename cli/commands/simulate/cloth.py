@@ -124,7 +124,7 @@ def command(
     stability.png draws the cloth by every solver and integrator. Colliders move with their nodes at every step.
     --self-collision takes about five times as long.
     """
-    voice = Reporter(quiet, verbose)
+    reporter = Reporter(quiet, verbose)
     began = time.perf_counter()
     simulation.check_fps(fps)
     kind = check_report(report)
@@ -133,9 +133,9 @@ def command(
     caches.write_options(ending, given | {"max_error": max_error})
     substeps = max(1, math.ceil(1 / (fps * parse_seconds(step, "--step")) - 1e-9))
     limit = None if max_stretch is None else units.parse_fraction(max_stretch, "--max-stretch")
-    with documents.source(input, voice) as source:
+    with documents.source(input, reporter) as source:
         document = source.document
-        scene = scenes.read_scene(document, source.name, voice)
+        scene = scenes.read_scene(document, source.name, reporter)
         number = driving_clip(document, clip)
         if loop and duration is not None and number is not None:
             raise UsageError("--loop closes the whole clip (expected no --duration)")
@@ -171,7 +171,7 @@ def command(
             estimate_error=kind == "json",
         )
         pinned = _pinned(document, scene, node, cloth, pin)
-        announce_compiling(voice)
+        announce_compiling(reporter)
         try:
             run = simulate_cloth(scene, driver, node, pinned, options)
         except UnstableError as error:
@@ -197,14 +197,14 @@ def command(
     if report is not None and not dry_run:
         write_report(run.report, report)
     for note in saved.written.notes:
-        voice.info(f"note: {note}")
+        reporter.info(f"note: {note}")
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
-    voice.info(
+    reporter.info(
         f"{name}  {text.format_bytes(saved.size)}, {_summary(run, substeps)}, {took}{' (dry run)' if dry_run else ''}"
     )
     if run.report.advice:
-        voice.warn(run.report.advice)
+        reporter.warn(run.report.advice)
 
 
 def _as_part(cache: VertexCache, scene: Scene, node: int) -> VertexCache:

@@ -219,25 +219,25 @@ def command(
                     planes=plane or (),
                     files=[each for each in colliders or () if each != RIGID_BODIES],
                 ),
-                *(_rigid_colliders(document, scene, voice) if RIGID_BODIES in (colliders or ()) else ()),
+                *(_rigid_colliders(document, scene, reporter) if RIGID_BODIES in (colliders or ()) else ()),
             ),
             attractors=tuple(parse_attractor(each, scene) for each in attractor or ()),
             max_error=0.0
             if max_error is None
             else units.parse_length(max_error, "--max-error", lambda: diagonal(scene)),
         )
-        announce_compiling(voice)
+        announce_compiling(reporter)
         run = simulate_particles(scene, driver, emitter, chosen)
         if ending in POINT_FORMATS:
             return encode_points(run.points(), fps, ending), run.report, _summary(run.report, has_nodes=False)
-        _check_nodes(run, form, voice, force=force)
+        _check_nodes(run, form, reporter, force=force)
         merged = (number, driver) if merge and number is not None else None
         if number is not None and merged is None:
-            note_own_clip(name, driver, voice)
+            note_own_clip(name, driver, reporter)
         return add_particles(document, run, name, merged, form.value), run.report, _summary(run.report)
 
-    voice = Reporter(quiet, verbose)
-    simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run, others=POINT_FORMATS)
+    reporter = Reporter(quiet, verbose)
+    simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run, others=POINT_FORMATS)
 
 
 def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
@@ -259,23 +259,23 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
     return ", ".join(parts)
 
 
-def _rigid_colliders(document: Document, scene: Scene, voice: Reporter) -> list[Obstacle]:
+def _rigid_colliders(document: Document, scene: Scene, reporter: Reporter) -> list[Obstacle]:
     found, others = read_rigid_colliders(document, scene.skeleton)
     if others:
         more = f" and {plural(len(others) - 1, 'other node')}" if len(others) > 1 else ""
-        voice.warn(
+        reporter.warn(
             f"the collider of {scene.skeleton.label(others[0])}{more} is no sphere, box, capsule or plane: left out"
         )
     return found
 
 
-def _check_nodes(run: ParticleRun, form: Form, voice: Reporter, *, force: bool) -> None:
+def _check_nodes(run: ParticleRun, form: Form, reporter: Reporter, *, force: bool) -> None:
     count = len(run.nodes)
     if count > MAX_NODES and not force:
         raise UnsupportedError(
             f"{count} particles at a time (limit {MAX_NODES} nodes)", help="lower --rate, or --force, or OUT.npz"
         )
     if count > MANY_NODES:
-        voice.warn(f"{count} nodes: players take about a second to bind their tracks")
+        reporter.warn(f"{count} nodes: players take about a second to bind their tracks")
     elif count > MANY_DRAWS and form is Form.NODE:
-        voice.info(f"note: {count} nodes are as many draw calls; --as skin needs one")
+        reporter.info(f"note: {count} nodes are as many draw calls; --as skin needs one")

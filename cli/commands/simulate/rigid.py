@@ -93,7 +93,7 @@ def command(
         estimate_error=report is not None,
     )
     material = Material(friction, friction, restitution)
-    voice = Reporter(quiet, verbose)
+    reporter = Reporter(quiet, verbose)
 
     def simulate(
         document: Document, scene: Scene, driver: Clip, number: int | None
@@ -102,7 +102,7 @@ def command(
         bodies, without_mesh = split_by_mesh(scene, _nodes(scene, body))
         if without_mesh:
             names = plural(len(without_mesh), "node")
-            voice.info(f"note: {names} of --body without a mesh of their own are no bodies")
+            reporter.info(f"note: {names} of --body without a mesh of their own are no bodies")
         chosen = ChosenNodes(
             bodies,
             shape.value,
@@ -116,13 +116,13 @@ def command(
         error = units.parse_length(max_error, "--max-error", lambda: diagonal(scene)) if max_error else 0.0
         run = simulate_rigid_bodies(scene, driver, description, replace(options, duration=seconds, max_error=error))
         for note in run.notes:
-            voice.warn(note)
+            reporter.warn(note)
         merged = (number, driver) if merge and number is not None else None
         if number is not None and merged is None:
-            note_own_clip(name, driver, voice)
+            note_own_clip(name, driver, reporter)
         return add_rigid_motion(document, run, name, merged), run.report, _summary(run.report)
 
-    simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)
+    simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run)
 
 
 def _nodes(scene: Scene, globs: list[str] | None) -> tuple[int, ...]:

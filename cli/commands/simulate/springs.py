@@ -123,7 +123,7 @@ def command(
         raise UsageError("--frequency replaces --stiffness and --drag (expected one or the other)")
     if damping_ratio is not None and frequency is None and not chain:
         raise UsageError("--damping-ratio needs --frequency")
-    voice = Reporter(quiet, verbose)
+    reporter = Reporter(quiet, verbose)
     options = SpringOptions(
         duration,
         parse_seconds(step, "--step"),
@@ -153,7 +153,7 @@ def command(
         except UnstableError as gone:
             raise report_divergence(scene.skeleton, bones, options, gone) from None
         for note in _notes(result, scene.skeleton, options):
-            voice.info(f"note: {note}")
+            reporter.info(f"note: {note}")
         prover = Prover(ErrorMetric(scene)) if max_error is not None or report is not None else None
         error = depth = None
         if prover is not None and report is not None:
@@ -166,7 +166,7 @@ def command(
         found = make_report(scene.skeleton, bones, options, result, error, depth)
         return _written(document, result.clip, number), found, _summary(found, result) + reduced
 
-    simulate_clip(input, output, clip, simulate, voice, report=report, dry_run=dry_run)
+    simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run)
 
 
 def _chains(

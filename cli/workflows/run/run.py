@@ -45,7 +45,7 @@ class RecipeRun:
     jobs: Sequence[Job]
     journal: Journal
     cache: ResultCache | None
-    voice: Reporter
+    reporter: Reporter
     processes: int
     cluster: Cluster | None = None
     written: dict[str, str] = field(default_factory=dict)
@@ -57,14 +57,14 @@ class RecipeRun:
     def run(self) -> int:
         """Run all jobs; return the largest exit code."""
         began = time.perf_counter()
-        self._progress = Progress("", len(self.jobs), shown=not self.voice.quiet)
+        self._progress = Progress("", len(self.jobs), shown=not self.reporter.quiet)
         try:
             with closing(self._results(self._look_up())) as results:  # ends the workers
                 for job, result in results:
                     self._record(job, result, MADE if result.code == errors.DONE else FAILED)
         except (KeyboardInterrupt, SystemExit):
             self._progress.close()
-            self.voice.info(
+            self.reporter.info(
                 f"ended after {self.counts.total()} of {plural(len(self.jobs), 'file')}: --resume continues"
             )
             raise
@@ -72,7 +72,7 @@ class RecipeRun:
             self._progress.close()
         counts = [f"{self.counts[each]} {each}" for each in STATUSES if self.counts[each]]
         took = format_duration(time.perf_counter() - began)
-        self.voice.info(f"{plural(len(self.jobs), 'file')}: {', '.join(counts)}, {took}")
+        self.reporter.info(f"{plural(len(self.jobs), 'file')}: {', '.join(counts)}, {took}")
         self.journal.write_line({"end": {**self.counts, "code": self.code}})
         return self.code
 
@@ -99,7 +99,7 @@ class RecipeRun:
             recipe = self._recipe(job)
             done = self.journal.find_done(job.folder, job.input, job.output, recipe)
             if done is not None:
-                before = input_size(job) if self.voice.verbose else 0  # for the line of --verbose
+                before = input_size(job) if self.reporter.verbose else 0  # for the line of --verbose
                 files = done.files or {}
                 result = JobResult(errors.DONE, done.messages, done.size, done.input_stamp, 0.0, before, files)
                 self._record(job, result, DONE_BEFORE)
@@ -173,15 +173,15 @@ class RecipeRun:
 
     def _report(self, job: Job, result: JobResult, status: str) -> None:
         """Report a file: errors, warnings and notes, and a line if it was made; with --verbose all lines of steps."""
-        voice = Reporter() if status == FAILED else self.voice
+        reporter = Reporter() if status == FAILED else self.reporter
         for line in result.messages if status != DONE_BEFORE else ():
-            is_shown = line.startswith("warning: ") or (is_notice(line) and not self.voice.quiet)
-            if status == FAILED or self.voice.verbose or is_shown:
+            is_shown = line.startswith("warning: ") or (is_notice(line) and not self.reporter.quiet)
+            if status == FAILED or self.reporter.verbose or is_shown:
                 Reporter().info(line if job.input in line or status == FAILED else f"{job.input}: {line}")
-        if status == MADE or (self.voice.verbose and status != FAILED):
+        if status == MADE or (self.reporter.verbose and status != FAILED):
             sizes = format_change(result.input_size, result.size)
             took = f", {format_duration(result.seconds)}" if status == MADE else f" ({status})"
-            voice.info(f"{job.output}  {sizes}{took}")
+            reporter.info(f"{job.output}  {sizes}{took}")
 
 
 def is_notice(line: str) -> bool:
