@@ -22,6 +22,11 @@ def check_motion(p: Floats, v: Floats, frame: int) -> None:
         raise UnstableError(f"the simulation diverges at frame {frame}")
 
 
+def longest_per_rest(elongation: float) -> float:
+    """Return the length per rest length above which an edge is too long for a fabric of an elongation."""
+    return MAX_LENGTH_PER_REST * (1 + min(elongation, MAX_ELASTIC_ELONGATION))
+
+
 def check_lengths(model: ClothModel, p: Floats, elongation: float, frame: int) -> None:
     """Raise UnstableError if edges of points (P, 3) are over three times as long as at rest.
 
@@ -32,8 +37,7 @@ def check_lengths(model: ClothModel, p: Floats, elongation: float, frame: int) -
     edges = model.topology.edges
     is_free = (model.inverse_masses[edges] > 0).any(axis=1)
     a, b = p[edges[is_free]].transpose(1, 0, 2)
-    factor = MAX_LENGTH_PER_REST * (1 + min(elongation, MAX_ELASTIC_ELONGATION))
-    excess = np.linalg.norm(a - b, axis=1) - factor * model.edge_lengths[is_free]
+    excess = np.linalg.norm(a - b, axis=1) - longest_per_rest(elongation) * model.edge_lengths[is_free]
     size = float(np.linalg.norm(np.ptp(model.rest, axis=0)))
     many = max(MAX_LONG_EDGES_FRACTION * len(excess), 1)
     if float(excess.max()) > MAX_EXCESS_PER_DIAGONAL * size or np.count_nonzero(excess > 0) > many:

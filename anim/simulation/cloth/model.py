@@ -62,6 +62,11 @@ class ClothModel:
     hierarchy: Hierarchy
     self_collision: float
 
+    @property
+    def masses(self) -> Floats:
+        """The masses (P,) kg of the points, 0 for pinned ones."""
+        return np.where(self.inverse_masses > 0, 1 / np.maximum(self.inverse_masses, 1e-300), 0.0)
+
 
 def build_cloth(
     positions: Floats, faces: Ints, pinned: Bools, fabric: Fabric, *, self_collision: bool = False

@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError, UnstableError
 from anim.model import Clip, FrameChunk, Scene, VertexCache
-from anim.simulation.cloth.driver import ClothDriver
+from anim.simulation.cloth.driver import ClothDriver, bake_vertices
 from anim.simulation.cloth.elongation import ElongationRecord, join_elongations, measure_elongation
 from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop, loop_rows
 from anim.simulation.cloth.model import ClothModel, build_cloth
@@ -46,7 +46,8 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     start = np.concatenate([chunk.positions for chunk in template.chunks()])[0].astype(np.float64)
     model = build_cloth(start, template.faces, pinned, options.fabric, self_collision=options.self_collision)
     followers = model.topology.first_vertex[model.pinned]
-    driver = ClothDriver(baker, clip, followers, scene, options.obstacles, options.environment.period)
+    pinned_baker = bake_vertices(scene, node, followers)
+    driver = ClothDriver(baker, pinned_baker, clip, scene, options.obstacles, options.environment.period)
     substeps, frames = _simulate_under_limit(model, driver, options)
     error = None
     if options.estimate_error:

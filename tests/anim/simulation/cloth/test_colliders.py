@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fixtures
+from anim.gltf.io import container
+from anim.gltf.reading import reader
+from anim.model import Clip
 from anim.sampling.sample import sample
 from anim.simulation.cloth.colliders import Capsule, Plane, from_spring_colliders
-from anim.simulation.cloth.driver import ClothDriver
+from anim.simulation.cloth.driver import ClothDriver, bake_vertices
 from anim.simulation.cloth.kernels.self_collision import separate_points
 from anim.simulation.cloth.model import Fabric
 from anim.simulation.cloth.solver import Environment
@@ -59,10 +63,10 @@ def test_free_cloth_stays_on_its_side_of_every_collider_of_spring_bones(kind: st
 
 
 def test_colliders_move_with_their_nodes_at_every_substep() -> None:
-    scene, clip, node, pinned = flag()
+    scene, clip, node, _ = flag()
     pole = scene.skeleton.names.index("pole")
     obstacles = (Capsule((0.3, 1.0, 0), (0.3, 1.5, 0), 0.1, pole, pole), Plane((0, 0.5, 0), (0, 1, 0), pole))
-    driver = ClothDriver(prepare_bake(scene, rigid=True, nodes=[node]), clip, np.flatnonzero(pinned), scene, obstacles)
+    driver = ClothDriver(prepare_bake(scene, rigid=True, nodes=[node]), None, clip, scene, obstacles)
     times = np.linspace(0.1, 0.2, 61)
     rows = driver.colliders(times)
     world = sample(scene.skeleton, clip, times, space="world").world
@@ -71,6 +75,27 @@ def test_colliders_move_with_their_nodes_at_every_substep() -> None:
     np.testing.assert_allclose(rows[:, 0, :3], expected, atol=1e-12)
     np.testing.assert_allclose(rows[:, 1, 3:6], world[:, pole, :, 1], atol=1e-12)
     assert (np.linalg.norm(np.diff(rows[:, 0, :3], axis=0), axis=1) > 1e-5).all()
+
+
+@pytest.mark.parametrize("name", ["flag", "tube", "morph_cube"])
+def test_pinned_points_follow_the_mesh_at_every_substep(name: str) -> None:
+    """The pinned points are baked alone, and are where the whole mesh has them: on a node, skinned, morphed."""
+    document = container.read(np.frombuffer(fixtures.build(name), np.uint8))
+    scene, clip = reader.scene(document), reader.clips(document)[0]
+    node = next(each.node for each in scene.instances)
+    baker = prepare_bake(scene, rigid=True, nodes=[node])
+    vertices = np.arange(1, baker.vertices, 3)
+    driver = ClothDriver(baker, bake_vertices(scene, node, vertices), clip, scene)
+    times = clip.start + np.linspace(0, 0.5, 13)
+    expected = np.concatenate([chunk.positions for chunk in baker.bake(clip, times=times).chunks()])[:, vertices]
+    np.testing.assert_array_equal(driver.targets(times - clip.start), expected.astype(np.float64))
+    assert np.ptp(expected, axis=0).max() > 1e-3
+    resting = replace(driver, clip=Clip("", ()))
+    for count in (5, 2):
+        np.testing.assert_array_equal(
+            resting.targets(np.arange(count) / 60), np.repeat(resting.all_vertices(0.0)[None, vertices], count, axis=0)
+        )
+    assert bake_vertices(scene, node, vertices[:0]) is None
 
 
 def test_a_folded_strip_does_not_pass_through_itself() -> None:
