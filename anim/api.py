@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from anim.arguments import Length, check_choice, check_function, check_workers, glob_list, meters, radians
 from anim.arrays import Floats, as_floats
-from anim.asset import Asset, AssetLike, PathName, as_asset
+from anim.asset import Asset, AssetLike, PathName, as_asset, copy_asset
 from anim.baked_cache import BakedCache, BakeOrigin
 from anim.errors import AnimError, RangeError
-from anim.gltf.document import copy_json
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.measure.compare import diff as compare
@@ -173,11 +172,9 @@ def bake(
         rigid=rigid,
         nodes=nodes,
     )
-    baked = frozenset(each.node for each in skinning.bakeable_instances(scene, rigid=rigid, nodes=nodes))
-    others = frozenset(() if nodes is None else {each.node for each in scene.instances} - baked)
-    whole = replace(asset, document=replace(asset.document, json=copy_json(asset.document.json)))
+    others = skinning.left_out_nodes(scene, rigid=rigid, nodes=nodes)
     index = next((i for i, each in enumerate(asset.clips) if each is playing), None)
-    origin = BakeOrigin(whole, playing, index, others, space == "mesh", times is not None)
+    origin = BakeOrigin(copy_asset(asset), playing, index, others, space == "mesh", times is not None)
     return BakedCache(**{each.name: getattr(cache, each.name) for each in fields(cache)}, origin=origin)
 
 

@@ -100,7 +100,7 @@ class Asset:
             if changed is not old:
                 new[i] = changed
         if not new:
-            return self._copy()
+            return copy_asset(self)
         document = writer.replace_clips(container.check_edits(self.document), new)
         return replace(self, document=_rename(document, {i: clip.name for i, clip in new.items()}))
 
@@ -122,14 +122,7 @@ class Asset:
                 )
         document = container.check_edits(self.document)
         longer = add_clips(document, new)
-        return self._copy() if longer is document else replace(self, document=longer)
-
-    def _copy(self) -> Asset:
-        """Return an equal asset with JSON of its own; an unchanged one still has the bytes it was read from."""
-        document, source = replace(self.document, json=copy_json(self.document.json)), self.source
-        if source is not None and source.document is self.document:
-            source = replace(source, document=document)
-        return Asset(document, source)
+        return copy_asset(self) if longer is document else replace(self, document=longer)
 
     def save(self, path: PathName | BinaryIO) -> None:
         """Write the asset, as `anim.save` does."""
@@ -151,6 +144,14 @@ class Asset:
 
 
 AssetLike: TypeAlias = Asset | Document | PathName
+
+
+def copy_asset(asset: Asset) -> Asset:
+    """Return an equal asset with JSON of its own; an unchanged one still has the bytes it was read from."""
+    document, source = replace(asset.document, json=copy_json(asset.document.json)), asset.source
+    if source is not None and source.document is asset.document:
+        source = replace(source, document=document)
+    return Asset(document, source)
 
 
 def load(file: PathName | RawBytes | BinaryIO) -> Asset:

@@ -10,8 +10,8 @@ from anim.arguments import Length, file_path, meters
 from anim.asset import Asset, AssetLike, PathName, as_asset
 from anim.caches import cache_file
 from anim.caches.options import WriteOptions
-from anim.caches.registry import CACHE_FORMATS
-from anim.caches.source_document.bake_source import BakeSource, baked_meshes
+from anim.caches.registry import CACHE_FORMATS, writer_for
+from anim.caches.source_document.bake_source import BakeSource, baked_meshes, self_contained
 from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.caches.storage import suffix
 from anim.caches.transforms import statistics, up_axis
@@ -19,8 +19,7 @@ from anim.caches.transforms.vertex_order import reorder
 from anim.errors import RangeError
 from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
-from anim.gltf.io import container, images
-from anim.gltf.writing.draco_decoding import decode_draco
+from anim.gltf.io import container
 from anim.gltf.writing.writer import replace_clips
 from anim.model import Clip, VertexCache
 from anim.operations.trim import trim
@@ -86,11 +85,11 @@ class BakedCache(VertexCache):
         doesn't support, OutputError if the file can't be written.
         """
         name = file_path(path)
+        writer_for(suffix(name))  # an unknown extension is refused first
         cache: VertexCache = up_axis.to_up_axis(reorder(self, vertex_order), up)
         limit = None if max_error is None else meters(max_error, "max_error", lambda: statistics.diagonal(cache))
         options = WriteOptions(limit, quantize, layout, preset, depth, rest_mesh)
-        format = CACHE_FORMATS.get(suffix(name))
-        takes_source = format is None or "source" in format.takes
+        takes_source = "source" in CACHE_FORMATS[suffix(name)].takes
         if onto is not None:
             if not takes_source:
                 raise RangeError(f"`onto` does not apply to {suffix(name)}")
@@ -106,9 +105,8 @@ def _source(cache: VertexCache, ending: str, asset: Asset, origin: BakeOrigin | 
     """The cache with normals if the asset is lit and the format has them, and the asset with images inside."""
     document = container.check_edits(asset.document)
     meshes = {each.mesh for each in baked_meshes(cache, document)}
-    document = images.embed(decode_draco(document, meshes), None if asset.source is None else asset.source.folder)
-    format = CACHE_FORMATS.get(ending)
-    if format is not None and "tangents" in format.holds:
+    document = self_contained(document, asset.source, meshes)
+    if "tangents" in CACHE_FORMATS[ending].holds:
         cache = with_shading_normals(cache, document)
     if origin is None:
         return cache, BakeSource(document, 0 if len(asset.clips) == 1 else None)

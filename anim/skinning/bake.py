@@ -163,6 +163,14 @@ def bakeable_instances(scene: Scene, *, rigid: bool = False, nodes: Sequence[int
     ]
 
 
+def left_out_nodes(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> frozenset[int]:
+    """Return the nodes with meshes that a bake of some nodes leaves out; none if `nodes` is None."""
+    if nodes is None:
+        return frozenset()
+    baked = {each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)}
+    return frozenset({each.node for each in scene.instances} - baked)
+
+
 def _handedness(chosen: Sequence[MeshInstance]) -> Floats:
     """The signs (V,) for the bitangent of normal and tangent; a mirrored joint does not change them.
 

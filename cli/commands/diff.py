@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import PurePath
 from typing import Annotated
 
 import numpy as np
@@ -17,7 +16,6 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
 from anim.measure.compare.name_matching import ambiguous_names, match_by_name
-from anim.measure.error.error_curve import error_curve
 from anim.measure.error.metric import FPS, ErrorMetric
 from anim.measure.error.surface import diagonal, is_measured_at
 from anim.measure.inspect.storage_cost import StorageCost, storage_costs
@@ -25,8 +23,6 @@ from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
-from anim.show.plots import error_plot as picture
-from anim.show.plots.figure import FORMATS
 from anim.units import is_zero, plural
 from cli import units
 from cli.errors import CheckError, UsageError
@@ -37,6 +33,7 @@ from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length
+from cli.workflows.diff_plot import check_plot, draw_errors
 from cli.workflows.vertex_diff import diff_by_vertex, is_cache
 from cli.workflows.vertex_motion import is_bake_of, pages_of
 
@@ -112,7 +109,7 @@ def command(
         raise UsageError("A and B can't both be stdin")
     if fps <= 0:
         raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
-    kind = "" if plot is None else _kind(plot)
+    kind = "" if plot is None else check_plot(plot)
     if html is not None:
         from cli.io.page_output import check_page  # imports readers of all formats, as in the functions below
 
@@ -156,7 +153,7 @@ def command(
     elif not quiet:
         documents.write_text(diff_report.text(report))
     if plot is not None:
-        drawn = _drawn(report, ruler, one, other, kind, limit)
+        drawn = draw_errors(report, ruler, one.clips, other.clips, kind=kind, limit=limit)
         documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
         reporter.info(f"{plot}  {format_bytes(len(drawn))}")
     if html is not None:
@@ -269,41 +266,6 @@ def _ambiguous(one: File, other: File, chosen: Sequence[int] | None) -> Iterator
                 f"{one.name} has {plural(counts[0], 'clip')} named '{name}' and {other.name} has {counts[1]}: "
                 "they are matched in their order, which may be wrong"
             )
-
-
-def _kind(path: str) -> str:
-    ending = PurePath(path).suffix.lower().lstrip(".")
-    if ending not in FORMATS:
-        raise UsageError(f"{path}: --plot writes .png or .svg")
-    documents.check_file(path)
-    return ending
-
-
-def _drawn(found: DiffReport, ruler: ErrorMetric, one: _Side, other: _Side, kind: str, limit: float | None) -> bytes:
-    apart = [each for each in found.diff.clips if each.error.max_error >= picture.MIN_ERROR_M]
-    profiles = [
-        replace(
-            error_curve(ruler, one.clips[each.old], other.clips[each.new], player=found.player, fps=found.fps),
-            name=reader.clip_name(each.name, each.old),
-        )
-        for each in apart[: picture.LIMIT]
-    ]
-    note = _left_out(len(profiles), len(apart), len(found.diff.clips))
-    names = [PurePath(each.name).name for each in (found.old, found.new)]
-    title = " → ".join(names if names[0] != names[1] else (found.old.name, found.new.name))
-    if "," in found.player:
-        title = f"{PurePath(found.old.name).name}: {found.player.replace(',', ' → ')}"
-    return picture.error_plot(profiles, title=title, kind=kind, limit=limit, note=note)
-
-
-def _left_out(drawn: int, apart: int, count: int) -> str:
-    """Number of clips drawn of those that differ, and number of clips that don't."""
-    shown = (
-        f"the worst {drawn} of {apart} clips that differ"
-        if drawn < apart
-        else f"{plural(apart, 'clip')} that differ{'s' if apart == 1 else ''}"
-    )
-    return f"{shown}, {count - apart} without difference" if count > apart else shown
 
 
 def _check(found: DiffReport, limit: float) -> None:

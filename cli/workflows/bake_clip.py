@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.caches.registry import CACHE_FORMATS
-from anim.caches.source_document.bake_source import BakeSource, baked_meshes
+from anim.caches.source_document.bake_source import BakeSource, baked_meshes, self_contained
 from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_tangents
 from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.errors import RangeError
@@ -26,7 +26,7 @@ from anim.model import Clip, Scene, VertexCache
 from anim.operations.selection import Selection
 from anim.operations.trim import trim
 from anim.sampling.times import frame_times
-from anim.skinning.bake import Baker, bakeable_instances, prepare_bake
+from anim.skinning.bake import Baker, bakeable_instances, left_out_nodes, prepare_bake
 
 
 class Output(NamedTuple):
@@ -124,7 +124,7 @@ def source_options(
     if not keeps_materials(output.ending):
         return {}
     baked = {each.node for each in bakeable_instances(scene, rigid=options.rigid, nodes=nodes)}
-    left_out = frozenset(() if nodes is None else {each.node for each in scene.instances} - baked)
+    left_out = left_out_nodes(scene, rigid=options.rigid, nodes=nodes)
     document = prepare_source(source, {source.document.json["nodes"][node]["mesh"] for node in baked}, output)
     index, played = clip
     if index is not None and (options.start, options.end) != (None, None) and played.end > played.start:
@@ -163,7 +163,7 @@ def prepare_source(source: Source, meshes: set[int], output: Output) -> Document
     There they are copied to if it is another folder. Meshes are without Draco data.
     """
     if output.ending != ".gltf":
-        return self_contained(source, meshes)
+        return self_contained(source.document, source, meshes)
     document = decode_draco(source.document, meshes)
     if source.folder is None or source.is_in_folder(output.path):
         return document
@@ -171,8 +171,3 @@ def prepare_source(source: Source, meshes: set[int], output: Output) -> Document
     if not output.dry_run:
         images.write_copies(copies)
     return document
-
-
-def self_contained(source: Source, meshes: set[int]) -> Document:
-    """Return the document of a source with its images inside, and meshes without Draco data."""
-    return images.embed(decode_draco(source.document, meshes), source.folder)

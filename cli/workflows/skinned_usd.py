@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from anim.caches.source_document.bake_source import self_contained
 from anim.errors import not_written
 from anim.exchange.usd_skel.write import UsdSkelResult, write
 from anim.gltf.document import Document
@@ -21,7 +22,6 @@ from cli.errors import UsageError
 from cli.io import cache_folders, documents, scenes
 from cli.reports.bake_notes import VISIBLE_ERROR_PER_DIAGONAL
 from cli.text import Reporter
-from cli.workflows.bake_clip import self_contained
 from cli.workflows.bake_jobs import bake_jobs
 
 
@@ -38,7 +38,8 @@ def convert_to_usd(
         scene = scenes.read_scene(source.document, source.name, reporter, normals=True)
         scenes.warn_of_other_scenes(source.document, source.name, reporter, None)
         ending = Path(output).suffix.lower()
-        document = self_contained(source, {source.document.json["nodes"][i.node]["mesh"] for i in scene.instances})
+        meshes = {source.document.json["nodes"][each.node]["mesh"] for each in scene.instances}
+        document = self_contained(source.document, source, meshes)
         jobs = bake_jobs(output, ending, [("", None)], [(found[i].name, i) for i in chosen])
         for job in jobs:
             played = Clip("", ()) if job.clip is None else found[job.clip]

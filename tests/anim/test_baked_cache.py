@@ -53,6 +53,8 @@ def test_a_bake_without_materials(source: anim.Asset, tmp_path: Path) -> None:
         baked.save(tmp_path / "blender.glb", vertex_order="blender")
     assert "materials" in str(caught.value.help)
     baked.save(tmp_path / "blender.glb", vertex_order="blender", materials=False)
+    with pytest.raises(anim.UnsupportedError, match=r"\.xyz"):  # before the vertices are compared
+        baked.save(tmp_path / "blender.xyz", vertex_order="blender")
 
 
 def test_a_bake_keeps_the_clip_that_was_baked(source: anim.Asset, tmp_path: Path) -> None:

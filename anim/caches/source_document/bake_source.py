@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from anim.errors import RangeError
 from anim.gltf.document import Document, Json, json_array, node_label
+from anim.gltf.io import images
+from anim.gltf.io.source import Source
 from anim.gltf.reading.reader import depth_first
+from anim.gltf.writing.draco_decoding import decode_draco
 from anim.model import MeshPart, VertexCache
 
 BAKED_SUFFIX = " (baked)"  # of the names of new nodes
@@ -69,8 +72,13 @@ def baked_meshes(cache: VertexCache, document: Document) -> tuple[BakedMesh, ...
         f"the cache has {cache.vertex_count} vertices, the meshes of the source have {counts[1]} ({counts[0]} of "
         "skinned and morphed ones)",
         help="bake the same file, with all vertices in the order of the file (`vertex_order` file), or leave the "
-        "materials out (materials=False in Python)",
+        "materials out (no `onto`)",
     )
+
+
+def self_contained(document: Document, source: Source | None, meshes: Collection[int]) -> Document:
+    """Return a document with the images of its source inside, and meshes without Draco data."""
+    return images.embed(decode_draco(document, meshes), None if source is None else source.folder)
 
 
 def _by_parts(parts: Sequence[MeshPart], json: Json) -> tuple[BakedMesh, ...] | None:

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Fix, Parameters, Rule
+from anim.check.rule import Fix, Parameters, Rule, counted
 from anim.gltf.document import Document, json_array
 from anim.gltf.validation.channel_targets import EXTENSION
-from anim.units import plural
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -18,9 +17,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     clips = json_array(file.json, "animations")
     uses = sum(EXTENSION in channel["target"].get("extensions", {}) for clip in clips for channel in clip["channels"])
     if uses and EXTENSION not in file.json.get("extensionsUsed", ()):
-        verb = "uses" if uses == 1 else "use"
-        problem = f"{plural(uses, 'channel')} {verb} {EXTENSION}, which is not in extensionsUsed"
-        yield Occurrence("extensionsUsed", "/extensionsUsed", uses, problem=problem)
+        yield Occurrence("extensionsUsed", "/extensionsUsed", uses)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
@@ -36,6 +33,10 @@ RULE = Rule(
     "Channels use KHR_animation_pointer, and extensionsUsed does not name it.",
     "Loaders skip extensions that are not declared; validators report an error (donmccurdy/glTF-Transform#1448).",
     find,
+    counted(
+        f"channel uses {EXTENSION}, which is not in extensionsUsed",
+        f"channels use {EXTENSION}, which is not in extensionsUsed",
+    ),
     advice="add it to extensionsUsed where the file is made",
     fix=Fix("add it to extensionsUsed", fix, is_safe=True),
 )

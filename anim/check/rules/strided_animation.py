@@ -6,20 +6,17 @@ from collections.abc import Iterator
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rule import Parameters, Rule
+from anim.check.rule import Parameters, Rule, counted
 from anim.check.rules.unused_samplers import REWRITE
 from anim.gltf.document import json_array
 from anim.gltf.validation.animation_storage import strided
-from anim.units import plural
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield one occurrence for all accessors."""
     found: set[int] = set().union(*(strided(file.json, each) for each in json_array(file.json, "animations")))
     if found:
-        verb = "is" if len(found) == 1 else "are"
-        problem = f"{plural(len(found), 'accessor')} {verb} in views with byteStride"
-        yield Occurrence("animations", f"/accessors/{min(found)}", len(found), problem=problem)
+        yield Occurrence("animations", f"/accessors/{min(found)}", len(found))
 
 
 RULE = Rule(
@@ -29,5 +26,6 @@ RULE = Rule(
     "Keys are in buffer views with byteStride.",
     "glTF 2.0 allows byteStride for vertex attributes only; players that ignore it read other numbers.",
     find,
+    counted("accessor is in a view with byteStride", "accessors are in views with byteStride"),
     advice=REWRITE,
 )
