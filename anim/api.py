@@ -195,8 +195,9 @@ def diff(
     old, new = as_asset(old), as_asset(new)
     globs = glob_list(clips, "clips")
     chosen = match_names(globs, old.clips.names, "clip") if globs else None
-    metric = ErrorMetric(old.scene, new.scene)
-    return compare.diff(metric, tuple(old.clips), tuple(new.clips), chosen=chosen, player=player, fps=fps)
+    before, after = tuple(old.clips), tuple(new.clips)
+    metric = ErrorMetric(old.scene, new.scene, clips=before + after)
+    return compare.diff(metric, before, after, chosen=chosen, player=player, fps=fps)
 
 
 def sample(asset: AssetLike, clip: ClipKey = 0, *, fps: float | None = None, times: ArrayLike | None = None) -> Floats:

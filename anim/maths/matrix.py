@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.maths import quaternion
+from anim.maths import hierarchy, quaternion
 
 MIN_AXIS_RATIO = 0.01  # of the longest axis; in float32, directions of shorter axes are dominated by rounding
 ORTHOGONALITY_TOLERANCE = 1e-9  # cosine between axes that counts as 0
@@ -91,27 +91,20 @@ def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def accumulate_world(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
-    """Return world matrices (N, F, 3, 4) from local ones: one batched product per level of the hierarchy.
+    """Return world matrices (N, F, 3, 4) from local ones: one batched product per level of the hierarchy, or fewer.
 
     parents: (N,), −1 for roots. levels: node indices by depth, roots first.
     """
     columns = np.swapaxes(local, 1, 3)
-    world = np.empty(columns.shape)
-    for depth, nodes in enumerate(levels):
-        own = columns[_index(nodes)]
-        if depth == 0:
-            world[_index(nodes)] = own
-            continue
-        above = world[_index(parents[nodes])]
-        product = np.einsum("njif,nkjf->nkif", above[:, :3], own)
-        product[:, 3] += above[:, 3]
-        world[_index(nodes)] = product
+    world = hierarchy.accumulate(columns, parents, levels, _multiply_columns)
     return np.swapaxes(world, 1, 3)
 
 
-def _index(nodes: Ints) -> Ints | slice:
-    """The nodes as an index; a single one as a slice, which copies nothing."""
-    return nodes if len(nodes) != 1 else slice(int(nodes[0]), int(nodes[0]) + 1)
+def _multiply_columns(above: Floats, own: Floats) -> Floats:
+    """Products of matrices given as (..., 4, 3, F)."""
+    product: Floats = np.einsum("njif,nkjf->nkif", above[:, :3], own)
+    product[:, 3] += above[:, 3]
+    return product
 
 
 def _by_component(shape: tuple[int, ...]) -> Floats:

@@ -104,7 +104,8 @@ class ClipOptimizer:
     @cached_property
     def _ruler(self) -> ErrorMetric:
         fraction = self.request.bounds.shell / (diagonal(self.before) or 1.0)
-        return ErrorMetric(self.before, self.after, shell=None if self.request.policy.drop_invisible else fraction)
+        shell = None if self.request.policy.drop_invisible else fraction
+        return ErrorMetric(self.before, self.after, shell=shell, clips=self.clips)
 
     @cached_property
     def _prover(self) -> Prover:

@@ -138,7 +138,8 @@ def command(
     scale = diagonal(one.scene)
     limit = None if fail_above is None else _length(fail_above, "--fail-above", scale)
     radius = _length(shell, "--shell", scale)
-    ruler = ErrorMetric(one.scene, other.scene, shell=radius / scale if radius and scale else None)
+    fraction = radius / scale if radius and scale else None
+    ruler = ErrorMetric(one.scene, other.scene, shell=fraction, clips=(*one.clips, *other.clips))
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
     report = DiffReport(one.file, other.file, found, *_names(one, other), who, fps, radius, is_measured_at(one.scene))

@@ -150,7 +150,7 @@ def _measured(
         hint = f" ({error.help})" if error.help else ""
         reporter.warn(f"measured at nodes, not on the surface: {error}{hint}")
         scene, at_nodes = Scene(skeleton, ()), True
-    prover = Prover(ErrorMetric(scene))
+    prover = Prover(ErrorMetric(scene, clips=(*edited.before.values(), *edited.after.values())))
     measured: list[Proof] = []
     first = first_equal([(before, edited.after[i]) for i, before in edited.before.items()])
     _warn_of_non_unit_keys(edited, first, reporter)

@@ -14,7 +14,7 @@ from anim.measure.continuous_bound.interval_rise import interval_rise
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
-from anim.model import Clip
+from anim.model import Clip, Scene
 from anim.sampling.players import PLAYERS
 
 BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is not refined
@@ -53,7 +53,7 @@ class Prover:
         self._reaches = [each for _, each in found if each is not None]
         self._order = [i for i, each in found if each is not None]
         self._parts = [ruler.combined[i] for i in self._order]
-        a, b = ruler.scene.skeleton, ruler.other.skeleton
+        a, b = ruler.skeletons
         same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
         self._knows_all = same and len(self._parts) == len(found)
 
@@ -102,14 +102,16 @@ class Prover:
     def _length(self, players: int) -> int:
         """Maximum number of intervals per step."""
         groups = sum(len(part.groups) for part in self._parts)
-        return max(BLOCK // (players * (groups + len(self.ruler.scene.skeleton)) + 1), 8)
+        return max(BLOCK // (players * (groups + len(self.ruler.skeletons[0])) + 1), 8)
 
     def _proven(
         self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget, longest: float
     ) -> tuple[float, RefinedMaximum]:
         """The bound of all intervals without refinement, and the result of refining the others."""
-        scenes = self.ruler.scene, self.ruler.other
-        risen = interval_rise(scenes, clips, times, self._reaches, list(limits), longest=longest)
+        one, other = (Scene(each, ()) for each in self.ruler.skeletons)
+        risen = interval_rise(
+            (one, other), self.ruler.clips(*clips), times, self._reaches, list(limits), longest=longest
+        )
         closed, asked = 0.0, []
         for player, each in limits.items():
             tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise

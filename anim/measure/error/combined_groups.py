@@ -76,9 +76,10 @@ class CombinedGroups:
         part, first = self._part(found.group)
         return part.vertex(replace(found, group=found.group - first))
 
-    def name_of(self, group: int) -> str:
-        """Return the name of a group's surface; empty for shells."""
-        return self._part(group)[0].name
+    def name_of(self, found: MaxDisplacement) -> str:
+        """Return the name of the surface of what was found; empty for shells."""
+        part, first = self._part(found.group)
+        return part.name_of(replace(found, group=found.group - first))
 
     def _part(self, group: int) -> tuple[SkinnedGroups | ShellPoints, int]:
         """The part of a group, and the index of its first group."""

@@ -7,20 +7,23 @@ the length of a clip.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, unique_sorted
+from anim.arrays import Floats, Ints, unique_sorted
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import max_displacement
+from anim.measure.error.merged_groups import merge_shells, merge_surfaces
+from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
+from anim.measure.error.reduced_skeleton import ReducedSkeleton, reduce_skeletons
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
-from anim.measure.error.surface import diagonal, has_vertices, surfaces
+from anim.measure.error.surface import Surface, diagonal, has_vertices, surfaces
 from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
 from anim.model.time_axis import merge_times
 from anim.sampling.players import parse_pair, sampler, sampler_for
@@ -87,18 +90,60 @@ class ErrorMetric:
     combined: the parts without morph targets as one, then the others.
     shell: as a fraction of the diagonal, the distance of six points around each node that moves no vertex; None ignores
     such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
+    clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
+    num_static_points: number of vertices, or of points of shells if there are none, that no clip moves: in no group.
     """
 
-    def __init__(self, scene: Scene, other: Scene | None = None, *, shell: float | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        other: Scene | None = None,
+        *,
+        shell: float | None = None,
+        clips: Iterable[Clip] | None = None,
+    ) -> None:
         self.scene, self.other = scene, other or scene
         self.diagonal = diagonal(scene)
         found = surfaces(scene) if shell is None or has_vertices(scene) else []
         self.pairs: Correspondence = match_scenes(scene, self.other, found)
-        self.parts: list[PointGroups] = [SkinnedGroups(*each) for each in self.pairs.surfaces]
+        self._reduced = None if clips is None else self._reduce(clips, found)
+        self.skeletons = (scene.skeleton, self.other.skeleton) if self._reduced is None else self._reduced.versions
+        self.parts: list[PointGroups] = []
+        self.num_static_points = 0
+        nodes = np.empty(0, np.int64)
         if shell is not None:
             nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, found) & (self.pairs.nodes >= 0))
-            self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
+        if self._reduced is None:
+            self.parts += [SkinnedGroups(*each) for each in self.pairs.surfaces]
+            if shell is not None:
+                self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
+        else:
+            groups, self.num_static_points = merge_surfaces(self.pairs.surfaces, self._reduced)
+            points = shell_points(scene.skeleton, nodes, (shell or 0.0) * self.diagonal)
+            names = [scene.skeleton.display_name(node) for node in range(len(scene.skeleton))]
+            shells = merge_shells(nodes, points, names, self._reduced)
+            if not self.pairs.surfaces:
+                self.num_static_points = points[..., 0].size - sum(len(g) for each in shells for g in each.groups)
+            self.parts += [*groups, *shells]
         self.combined = combine_groups(self.parts)
+
+    def _reduce(self, clips: Iterable[Clip], surfaces: Sequence[Surface]) -> ReducedSkeleton | None:
+        """The skeletons without static nodes, None where that is not possible or not worth it."""
+        one, other = self.scene.skeleton, self.other.skeleton
+        if not np.array_equal(self.pairs.nodes, np.arange(len(other))):
+            return None
+        morphing = [each.owner for each in surfaces if len(each.targets)]
+        morphing += [new.owner for _, new in self.pairs.surfaces if new is not None and len(new.rest_weights)]
+        return reduce_skeletons(one, other, clips, [node for node in morphing if node >= 0])
+
+    @property
+    def partners(self) -> Ints:
+        """For each node of the first of `skeletons` its index in the second, −1 without one."""
+        return self.pairs.nodes if self._reduced is None else np.arange(len(self.skeletons[0]))
+
+    def clips(self, before: Clip, after: Clip) -> tuple[Clip, Clip]:
+        """Return both clips for `skeletons`."""
+        return (before, after) if self._reduced is None else (self._reduced.clip(before), self._reduced.clip(after))
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
         """Return the error of `after` at the times of `dense_times`.
@@ -155,7 +200,7 @@ class ErrorMetric:
                     size, vertex, worst = found.length, part.vertex(found), players[found.frame // count]
                     frame = first + found.frame % count
                     joint = part.node(field.joint(found.group, found.frame, found.vertex))
-                    place = part.name_of(found.group) or self.called(joint)
+                    place = part.name_of(found) or self.called(joint)
             first += count
         time = float(times[frame]) if len(times) else 0.0
         fraction, pointer = pointer_error(before, after, times)
@@ -165,15 +210,15 @@ class ErrorMetric:
         """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""
         pairs = [parse_pair(player) for player in players]
         samplers = [
-            (PoseSampler(scene.skeleton, clip), [sampler(pair[i]) for pair in pairs])
-            for i, (scene, clip) in enumerate(((self.scene, before), (self.other, after)))
+            (PoseSampler(skeleton, clip), [sampler(pair[i]) for pair in pairs])
+            for i, (skeleton, clip) in enumerate(zip(self.skeletons, self.clips(before, after), strict=True))
         ]
         length = max(self.length // len(players), 1)
         for start in range(0, max(len(times), 1), length):
             chosen = times[start : start + length]
             old, new = (
-                PosedSkeleton(scene.skeleton, poses.at_each(chosen, samples))
-                for scene, (poses, samples) in zip((self.scene, self.other), samplers, strict=True)
+                PosedSkeleton(skeleton, poses.at_each(chosen, samples))
+                for skeleton, (poses, samples) in zip(self.skeletons, samplers, strict=True)
             )
             yield Block(old.times, old, new)
 
@@ -185,8 +230,8 @@ class ErrorMetric:
         overlap: number of times that a block shares with the next one.
         """
         old, new = (
-            sampler_for(scene.skeleton, clip, player=name)
-            for scene, clip, name in zip((self.scene, self.other), (before, after), parse_pair(player), strict=True)
+            sampler_for(skeleton, clip, player=name)
+            for skeleton, clip, name in zip(self.skeletons, self.clips(before, after), parse_pair(player), strict=True)
         )
         for start in range(0, max(len(times) - overlap, 1), self.length):
             chosen = times[start : start + self.length + overlap]
@@ -195,7 +240,7 @@ class ErrorMetric:
     @property
     def length(self) -> int:
         """Maximum number of times of a block."""
-        matrices = sum(len(part.groups) for part in self.parts) + len(self.scene.skeleton) + len(self.other.skeleton)
+        matrices = sum(len(part.groups) for part in self.parts) + sum(map(len, self.skeletons))
         return max(BLOCK // max(matrices, 1), 8)
 
     def posed(
@@ -205,10 +250,13 @@ class ErrorMetric:
 
         asked: names in PLAYERS, each with its times; not more times than `length` in total.
         """
-        return _posed(self.scene.skeleton, before, asked), _posed(self.other.skeleton, after, asked)
+        old, new = self.clips(before, after)
+        return _posed(self.skeletons[0], old, asked), _posed(self.skeletons[1], new, asked)
 
     def called(self, node: int) -> str:
-        """Return the name of a node of the first scene for reports: its own, or "node 7"; "" for −1."""
+        """Return the name of a node of `skeletons` for reports: its own, or "node 7"; "" for −1."""
+        if self._reduced is not None:
+            node = int(self._reduced.nodes[node])
         return self.scene.skeleton.display_name(node) if node >= 0 else ""
 
 

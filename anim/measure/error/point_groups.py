@@ -62,8 +62,8 @@ class PointGroups(Protocol):
         """Name of the mesh or node, for reports; empty if each group has its own."""
         ...
 
-    def name_of(self, group: int) -> str:
-        """Return the name of a group's mesh or node; empty for shells."""
+    def name_of(self, found: MaxDisplacement) -> str:
+        """Return the name of the mesh or node of what was found; empty for shells."""
         ...
 
     def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
@@ -147,9 +147,9 @@ class SkinnedGroups:
         """Name of the mesh or node, for reports."""
         return self.surface.name
 
-    def name_of(self, group: int) -> str:
+    def name_of(self, found: MaxDisplacement) -> str:
         """Return the name of the mesh or node."""
-        del group
+        del found
         return self.name
 
     def leader(self, group: int) -> int:

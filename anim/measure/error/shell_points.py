@@ -33,9 +33,9 @@ class ShellPoints:
         """Empty: each group has the name of its node."""
         return ""
 
-    def name_of(self, group: int) -> str:
+    def name_of(self, found: MaxDisplacement) -> str:
         """Return an empty name: each group has that of its node."""
-        del group
+        del found
         return self.name
 
     def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:

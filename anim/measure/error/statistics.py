@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.maths import quaternion
+from anim.maths import hierarchy, quaternion
 from anim.measure.error.displacement import lengths_by_group, max_displacement
+from anim.measure.error.merged_groups import MergedGroups
 from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, ErrorMetric, dense_times
+from anim.measure.error.point_groups import PointGroups
 from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.times import frame_times
@@ -66,7 +68,7 @@ def statistics(
     fps: frames per second of the grid for speeds, 120 by default.
     """
     times = dense_times(before, after, fps=fps) if times is None else times
-    vertices = sum(len(group) for part in ruler.parts for group in part.groups)
+    vertices = ruler.num_static_points + sum(len(group) for part in ruler.parts for group in part.groups)
     count = int(np.clip(MAX_SAMPLES // max(vertices, 1), 2, FRAMES))
     chosen = np.array(sorted(set(np.linspace(0, len(times) - 1, count).round().astype(np.int64).tolist())))
     found: list[Floats] = []
@@ -102,7 +104,7 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
             if top.length > worst.size:
                 joint = ruler.called(part.node(rate.joint(top.group, top.frame, top.vertex)))
                 time = float(block.times[top.frame] + block.times[top.frame + 1]) / 2
-                worst = Peak(top.length, time, part.name_of(top.group) or joint, joint, part.vertex(top))
+                worst = Peak(top.length, time, part.name_of(top) or joint, joint, part.vertex(top))
     return worst
 
 
@@ -113,11 +115,16 @@ def _take(block: Block, frames: Ints) -> Block:
 def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
     """Distances of all vertices at all times of the block; without vertices, of the points of shells."""
     frames = np.arange(len(block.times))
-    surfaces = [part for part in ruler.parts if not isinstance(part, ShellPoints)]
-    for part in surfaces or ruler.parts:
+    surfaces = [part for part in ruler.parts if not _is_shell(part)]
+    yield np.zeros(ruler.num_static_points * len(frames))
+    for part in surfaces if surfaces or ruler.pairs.surfaces else ruler.parts:
         field = part.field(block.old, block.new)
         if field is not None:
             yield from lengths_by_group(field, len(part.groups), frames)
+
+
+def _is_shell(part: PointGroups) -> bool:
+    return isinstance(part, ShellPoints) or (isinstance(part, MergedGroups) and not part.has_vertices)
 
 
 def _percentile(values: Floats, share: float) -> float:
@@ -128,12 +135,12 @@ def _percentile(values: Floats, share: float) -> float:
 
 def _rotation_errors(ruler: ErrorMetric, block: Block) -> Peak:
     """The largest angle between the world rotations of a node in both versions."""
-    old = _world_rotations(ruler.scene.skeleton, block.old.pose)
-    new = _world_rotations(ruler.other.skeleton, block.new.pose)
-    both = np.flatnonzero(ruler.pairs.nodes >= 0)
+    old, new = (_world_rotations(each.skeleton, each.pose) for each in (block.old, block.new))
+    partners = ruler.partners
+    both = np.flatnonzero(partners >= 0)
     if not len(both):
         return Peak()
-    angles = quaternion.angle_between(old[both], new[ruler.pairs.nodes[both]])
+    angles = quaternion.angle_between(old[both], new[partners[both]])
     node, frame = np.unravel_index(int(angles.argmax()), angles.shape)
     name = ruler.called(int(both[node]))
     return Peak(float(angles[node, frame]), float(block.times[frame]), name, name) if angles[node, frame] else Peak()
@@ -142,10 +149,7 @@ def _rotation_errors(ruler: ErrorMetric, block: Block) -> Peak:
 def _world_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     """World rotations of all nodes (N, F, 4), without scales."""
     local = quaternion.normalize(np.swapaxes(pose.rotation, 0, 1))
-    result = local.copy()
-    for level in skeleton.levels()[1:]:
-        result[level] = quaternion.multiply(result[skeleton.parents[level]], local[level])
-    return result
+    return hierarchy.accumulate(local, skeleton.parents, skeleton.levels(), quaternion.multiply)
 
 
 def _weighted(ruler: ErrorMetric, block: Block) -> Peak:

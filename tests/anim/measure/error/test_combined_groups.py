@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from anim.measure.error.combined_groups import combine_groups
+from anim.measure.error.displacement import MaxDisplacement
 from anim.measure.error.metric import ErrorMetric, dense_times
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.shell_points import ShellPoints
@@ -51,7 +52,8 @@ def test_joined_vectors_are_those_of_the_parts() -> None:
             assert whole.vectors(group, np.arange(9)) == pytest.approx(vectors, abs=1e-12)
             longest = np.linalg.norm(vectors, axis=1).max(axis=0)
             assert (whole.limits[group] >= longest * (1 - 1e-12)).all()
-            assert (joined.leader(group), joined.name_of(group)) == (part.leader(number), part.name)
+            found = MaxDisplacement(0.0, group, 0, 0, whole.limits)
+            assert (joined.leader(group), joined.name_of(found)) == (part.leader(number), part.name)
             group += 1
     assert len(joined.groups) == group
 

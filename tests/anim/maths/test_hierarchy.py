@@ -1,0 +1,52 @@
+"""Products along the paths of trees: sections of levels agree with one level after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats, Ints
+from anim.maths import hierarchy, quaternion
+
+
+def levels_of(parents: list[int]) -> list[Ints]:
+    depths: list[int] = []
+    for parent in parents:
+        depths.append(depths[parent] + 1 if parent >= 0 else 0)
+    return [np.flatnonzero(np.array(depths) == depth) for depth in range(max(depths) + 1)]
+
+
+def test_a_chain_by_hand() -> None:
+    local = np.array([[2.0], [3.0], [5.0]])
+    parents = np.array([-1, 0, 1])
+    found = hierarchy.accumulate(local, parents, levels_of([-1, 0, 1]), np.multiply)
+    assert found.tolist() == [[2], [6], [30]]
+
+
+@pytest.mark.parametrize("depth", [hierarchy.MIN_DEPTH, 401])
+def test_deep_trees_have_the_products_of_each_path(depth: int) -> None:
+    """Chains of several lengths that leave one trunk; rotations, which do not commute."""
+    parents = list(range(-1, depth - 1))
+    for start in (0, 17, 200, depth - 5):
+        parents += [start, *range(len(parents), len(parents) + 40)]
+    random = np.random.default_rng(0)
+    local = quaternion.normalize(random.normal(size=(len(parents), 2, 4)))
+    found = hierarchy.accumulate(local, np.array(parents), levels_of(parents), quaternion.multiply)
+    expected: list[Floats] = []
+    for node, parent in enumerate(parents):
+        expected.append(local[node] if parent < 0 else quaternion.multiply(expected[parent], local[node]))
+    assert found == pytest.approx(np.array(expected), abs=1e-12)
+
+
+def test_a_deep_tree_takes_few_steps() -> None:
+    calls = 0
+
+    def compose(above: Floats, own: Floats) -> Floats:
+        nonlocal calls
+        calls += 1
+        return above * own
+
+    count = 10_000
+    parents = np.arange(-1, count - 1)
+    hierarchy.accumulate(np.ones((count, 1)), parents, list(np.arange(count)[:, None]), compose)
+    assert calls <= 2 * 100
