@@ -104,8 +104,8 @@ def test_errors_of_reduced_skeletons(seed: int, meshes: bool, other: str) -> Non
     for player in PLAYERS:
         expected, found = (each.error_at(before, after, times, player=player) for each in (whole, less))
         assert found.max_error == pytest.approx(expected.max_error, rel=2e-3)
-            if other != "rest":  # which moves several by as much at all times
-                assert (found.time, found.place, found.vertex) == (expected.time, expected.place, expected.vertex)
+        if other != "rest":  # which moves several by as much at all times
+            assert (found.time, found.place, found.vertex) == (expected.time, expected.place, expected.vertex)
     proofs = [
         Prover(each).certified(before, after, times, each.sample_errors(before, after, times)) for each in (whole, less)
     ]
