@@ -17,7 +17,7 @@ from anim.simulation.particles.kernels.solids import (
     to_world,
 )
 from anim.simulation.particles.kernels.vectors import Vector, add, dot, length
-from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.jit import callee
 
 MIN_FLIGHT_S = 4e-3  # of a bounce, 20 µm high; whatever the step, so that it doesn't change the result
 ORIGIN = (0.0, 0.0, 0.0)
@@ -45,7 +45,7 @@ class Grid(NamedTuple):
     friction: float
 
 
-@jit
+@callee
 def respond(v: Vector, moving: Vector, face: Vector, a: Vector, grid: Grid) -> tuple[Vector, bool]:
     """Return the velocity after an impact, by restitution and Coulomb's friction, and whether the particle stays.
 
@@ -64,7 +64,7 @@ def respond(v: Vector, moving: Vector, face: Vector, a: Vector, grid: Grid) -> t
     return add(add(moving, factor, tangential), bounce, face), stays
 
 
-@jit
+@callee
 def slide_face(
     a: Vector, face: Vector, h: float, x: Vector, v: Vector, friction: float
 ) -> tuple[float, Vector, Vector, bool, bool]:
@@ -87,7 +87,7 @@ def slide_face(
     return h, add(add(x, h, v), 0.5 * h * h, total), add(v, h, total), False, False
 
 
-@jit
+@callee
 def slide_surface(
     k: int, i: int, f0: float, t: float, h: float, x: Vector, v: Vector, field: ForceField, solids: Solids, grid: Grid
 ) -> tuple[bool, Vector, Vector]:
@@ -114,7 +114,7 @@ def slide_surface(
     return True, add(x1, -distance(solids, k, i, f1, x1), normal(solids, k, i, f1, x1)), v1
 
 
-@jit
+@callee
 def rest(
     field: ForceField, grid: Grid, face: Vector, n: int, last: int, x: Vector, energies: Floats
 ) -> int:  # fmt: skip

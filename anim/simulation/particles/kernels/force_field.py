@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from anim.arrays import Floats
 from anim.simulation.particles.kernels.turbulence import turbulent_velocity
 from anim.simulation.particles.kernels.vectors import Vector, add, dot, length
-from anim.skinning.kernels.jit import inline, jit
+from anim.skinning.kernels.jit import callee, inline, jit
 
 METHODS = ("explicit-euler", "symplectic-euler", "velocity-verlet", "rk4", "implicit-euler")  # their codes are indices
 
@@ -41,13 +41,13 @@ class ForceField(NamedTuple):
     is_uniform: bool
 
 
-@jit
+@callee
 def uniform_air(forces: UniformForces, t: float, x: Vector) -> Vector:
     """Return the velocity of the air in m/s: the wind."""
     return forces.wind
 
 
-@jit
+@callee
 def uniform_acceleration(forces: UniformForces, t: float, x: Vector, v: Vector, air: Vector) -> Vector:
     """Return the acceleration in m/s² by gravity and drag. air: its velocity in m/s."""
     relative = add(v, -1.0, air)
@@ -63,7 +63,7 @@ def air_velocity(field: ForceField, t: float, x: Vector) -> Vector:
     return turbulent_velocity(field.modes, field.scratch, t, x, field.uniform.wind)
 
 
-@jit
+@callee
 def acceleration(field: ForceField, t: float, x: Vector, v: Vector, air: Vector) -> Vector:
     """Return the acceleration in m/s² by all forces at t s. air: its velocity in m/s."""
     a = uniform_acceleration(field.uniform, t, x, v, air)
@@ -73,7 +73,7 @@ def acceleration(field: ForceField, t: float, x: Vector, v: Vector, air: Vector)
     return a
 
 
-@jit
+@callee
 def attractor_center(field: ForceField, k: int, t: float) -> Vector:
     """Return the center of an attractor at t s, linear between the ends of steps."""
     centers = field.centers
@@ -84,13 +84,13 @@ def attractor_center(field: ForceField, k: int, t: float) -> Vector:
     return (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), a[2] + u * (b[2] - a[2]))
 
 
-@jit
+@callee
 def pull_per_metre(strength: float, radius: float, distance: float) -> float:
     """Return the acceleration towards an attractor over the distance: gravity of a ball, uniform inside."""
     return strength / radius if distance <= radius else strength * radius * radius / (distance * distance * distance)
 
 
-@jit
+@callee
 def potential(field: ForceField, t: float, x: Vector) -> float:
     """Return the potential energy in J/kg of gravity, 0 at the origin, and of attractors, 0 far away."""
     energy = -dot(field.uniform.gravity, x)
@@ -101,14 +101,14 @@ def potential(field: ForceField, t: float, x: Vector) -> float:
     return energy
 
 
-@jit
+@callee
 def uniform_implicit_change(forces: UniformForces, t: float, x: Vector, v: Vector, h: float, air: Vector) -> Vector:
     """Return the change of velocity of one Newton step of implicit Euler under uniform forces."""
     a = uniform_acceleration(forces, t, x, v, air)
     return _solve(forces, add(v, -1.0, air), (h * a[0], h * a[1], h * a[2]), h, 0.0)
 
 
-@jit
+@callee
 def implicit_change(field: ForceField, t: float, x: Vector, v: Vector, h: float, air: Vector) -> Vector:
     """Return the change of velocity of one Newton step of implicit Euler.
 
@@ -123,7 +123,7 @@ def implicit_change(field: ForceField, t: float, x: Vector, v: Vector, h: float,
     return _solve(field.uniform, add(v, -1.0, air), (h * a[0], h * a[1], h * a[2]), h, stiffness)
 
 
-@jit
+@callee
 def _solve(forces: UniformForces, relative: Vector, right: Vector, h: float, stiffness: float) -> Vector:
     """Solution of (diagonal · I + b r rᵀ) dv = right, r being the velocity relative to the air."""
     speed = length(relative)
@@ -142,7 +142,7 @@ def _integrator(
     """
     inlined_air, inlined_force = inline(air_at.py_func), inline(force.py_func)  # type: ignore[attr-defined]
 
-    @jit
+    @callee
     def integrate(
         forces: Any, method: int, t: float, x: Vector, v: Vector, h: float, air: Vector
     ) -> tuple[Vector, Vector, Vector]:

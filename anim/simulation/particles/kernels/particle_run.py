@@ -32,7 +32,7 @@ from anim.simulation.particles.kernels.solids import (
     surface_velocity,
 )
 from anim.simulation.particles.kernels.vectors import Vector, add, dot, hermite, hermite_velocity, length
-from anim.skinning.kernels.jit import inline, jit
+from anim.skinning.kernels.jit import callee, inline, jit
 
 MAX_SPEED_M_S = 1e5  # beyond, the run is called unstable
 STATISTICS = ("impacts", "max_speed", "penetration", "bad_step", "bad_speed", "energy_change", "kinetic_s", "inside")
@@ -163,7 +163,7 @@ def _run_particle(
     return keys
 
 
-@jit
+@callee
 def _advance(
     state: State, keys: Floats, count: Ints, n: int, t: float, h: float,
     field: ForceField, solids: Solids, grid: Grid, statistics: Floats,
@@ -219,7 +219,7 @@ def _advance(
     return State(x, ORIGIN, resting, face, ignored, False)  # wedged between obstacles
 
 
-@jit
+@callee
 def _first_impact(
     solids: Solids, resting: int, ignored: int, i: int, f0: float, f1: float, step: float, h: float,
     x0: Vector, v0: Vector, x1: Vector, v1: Vector,
@@ -234,7 +234,7 @@ def _first_impact(
     return hit, first
 
 
-@jit
+@callee
 def _fly(
     shapes: Floats, poses: Floats, field: ForceField, grid: Grid, n: int, last: int, x: Vector, v: Vector,
     energies: Floats, statistics: Floats,
@@ -280,7 +280,7 @@ def _fly(
     return n, x, v
 
 
-@jit
+@callee
 def _note_penetration(solids: Solids, i: int, f: float, x: Vector, ignored: int, statistics: Floats) -> None:
     for k in range(len(solids.shapes)):
         if not (ignored >> k) & 1:

@@ -7,14 +7,14 @@ import numpy as np
 from anim.arrays import AnyArray, Floats, Ints
 from anim.simulation.particles.kernels.force_field import ForceField, potential
 from anim.simulation.particles.kernels.vectors import Vector, dot
-from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.jit import callee
 
 MAX_IMPACTS_PER_STEP = 12  # then the particle stays where it is until the next step
 MAX_KEYS_PER_STEP = 4 * MAX_IMPACTS_PER_STEP + 8
 KEY_WIDTH = 10  # time, position, velocities before and after
 
 
-@jit
+@callee
 def add_energy(energies: Floats, frame: int, field: ForceField, t: float, x: Vector, v: Vector) -> None:
     """Add the energies of a particle of 1 kg to those of a frame: number, kinetic, potential."""
     energies[frame, 0] += 1.0
@@ -22,7 +22,7 @@ def add_energy(energies: Floats, frame: int, field: ForceField, t: float, x: Vec
     energies[frame, 2] += potential(field, t, x)
 
 
-@jit
+@callee
 def write_key(keys: Floats, count: Ints, t: float, x: Vector, before: Vector, after: Vector) -> None:
     """Append a key."""
     row = count[0]
@@ -32,7 +32,7 @@ def write_key(keys: Floats, count: Ints, t: float, x: Vector, before: Vector, af
     count[0] += 1
 
 
-@jit
+@callee
 def grow(keys: Floats, count: Ints) -> AnyArray:
     """Return the keys, with space for those of a step."""
     if count[0] + MAX_KEYS_PER_STEP <= len(keys):

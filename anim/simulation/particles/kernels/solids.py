@@ -16,7 +16,7 @@ from anim.simulation.particles.kernels.vectors import (
     length,
     rotate,
 )
-from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.jit import callee
 
 FLOOR, CAPSULE, BOX = range(3)
 BALL, MOVING = 4, 5  # columns of `shapes`
@@ -41,19 +41,19 @@ class Solids(NamedTuple):
     poses: Floats
 
 
-@jit
+@callee
 def is_moving(solids: Solids, k: int) -> bool:
     """Return whether obstacle k moves or is turned."""
     return bool(solids.shapes[k, MOVING] != 0.0)
 
 
-@jit
+@callee
 def is_flat(solids: Solids, k: int) -> bool:
     """Return whether a particle can rest on obstacle k without moving."""
     return bool(solids.shapes[k, 0] != CAPSULE and solids.shapes[k, MOVING] == 0.0)
 
 
-@jit
+@callee
 def pose_at(solids: Solids, k: int, i: int, u: float) -> Pose:
     """Return center and rotation of obstacle k at the fraction u of step i."""
     a = solids.poses[0, k]
@@ -68,27 +68,27 @@ def pose_at(solids: Solids, k: int, i: int, u: float) -> Pose:
     return center, (x / norm, y / norm, z / norm, r / norm)
 
 
-@jit
+@callee
 def to_local(pose: Pose, x: Vector) -> Vector:
     """Return a point relative to a pose."""
     q = pose[1]
     return rotate((-q[0], -q[1], -q[2], q[3]), add(x, -1.0, pose[0]))
 
 
-@jit
+@callee
 def to_world(pose: Pose, p: Vector) -> Vector:
     """Return the point of the world that is at p relative to a pose."""
     return add(pose[0], 1.0, rotate(pose[1], p))
 
 
-@jit
+@callee
 def _from_axis(solids: Solids, k: int, p: Vector) -> Vector:
     """Vector from the nearest point of a capsule's axis."""
     half = float(solids.shapes[k, 2])
     return (p[0], p[1] - min(max(p[1], -half), half), p[2])
 
 
-@jit
+@callee
 def local_distance(solids: Solids, k: int, p: Vector) -> float:
     """Return the signed distance in m, below 0 inside, of a point relative to obstacle k."""
     kind = solids.shapes[k, 0]
@@ -101,7 +101,7 @@ def local_distance(solids: Solids, k: int, p: Vector) -> float:
     return outside + float(min(max(x, y, z), 0.0))
 
 
-@jit
+@callee
 def local_normal(solids: Solids, k: int, p: Vector) -> Vector:
     """Return the outward normal at the surface's point nearest to p, relative to obstacle k; up on an axis."""
     kind = solids.shapes[k, 0]
@@ -121,7 +121,7 @@ def local_normal(solids: Solids, k: int, p: Vector) -> Vector:
     return (0.0, sy, 0.0) if y >= z else (0.0, 0.0, sz)
 
 
-@jit
+@callee
 def distance(solids: Solids, k: int, i: int, u: float, x: Vector) -> float:
     """Return the signed distance in m of a point from obstacle k at the fraction u of step i."""
     if is_moving(solids, k):
@@ -130,14 +130,14 @@ def distance(solids: Solids, k: int, i: int, u: float, x: Vector) -> float:
     return local_distance(solids, k, (x[0] - a[0], x[1] - a[1], x[2] - a[2]))
 
 
-@jit
+@callee
 def normal(solids: Solids, k: int, i: int, u: float, x: Vector) -> Vector:
     """Return the outward normal in the world."""
     pose = pose_at(solids, k, i, u)
     return rotate(pose[1], local_normal(solids, k, to_local(pose, x)))
 
 
-@jit
+@callee
 def surface_velocity(solids: Solids, k: int, i: int, u: float, h: float, x: Vector) -> Vector:
     """Return the velocity in m/s of obstacle k at a point of the world. h: s, the whole step."""
     if not is_moving(solids, k):
@@ -149,7 +149,7 @@ def surface_velocity(solids: Solids, k: int, i: int, u: float, h: float, x: Vect
     return ((b[0] - a[0]) / span, (b[1] - a[1]) / span, (b[2] - a[2]) / span)
 
 
-@jit
+@callee
 def is_on_face(solids: Solids, k: int, x: Vector, face: Vector) -> bool:
     """Return whether a point on a static obstacle is on its face with this normal."""
     if solids.shapes[k, 0] != BOX:
@@ -161,7 +161,7 @@ def is_on_face(solids: Solids, k: int, x: Vector, face: Vector) -> bool:
     return is_on
 
 
-@jit
+@callee
 def impact_fraction(
     solids: Solids, k: int, i: int, f0: float, f1: float, step: float, h: float,
     x0: Vector, v0: Vector, x1: Vector, v1: Vector,
@@ -198,7 +198,7 @@ def impact_fraction(
     return _root(solids, k, i, f0, f1, h, x0, v0, x1, v1, previous, u, limit)
 
 
-@jit
+@callee
 def _root(
     solids: Solids, k: int, i: int, f0: float, f1: float, h: float,
     x0: Vector, v0: Vector, x1: Vector, v1: Vector, low: float, high: float, limit: float,
@@ -225,7 +225,7 @@ def _root(
     return low
 
 
-@jit
+@callee
 def _reach(
     solids: Solids, k: int, i: int, f0: float, f1: float, h: float,
     x0: Vector, v0: Vector, x1: Vector, v1: Vector,
@@ -240,7 +240,7 @@ def _reach(
     return way
 
 
-@jit
+@callee
 def containing(solids: Solids, i: int, f: float, x: Vector) -> int:
     """Return the bits of the obstacles that a point is in."""
     found = 0

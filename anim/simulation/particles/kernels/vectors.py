@@ -6,31 +6,31 @@ from typing import TypeAlias
 
 import numpy as np
 
-from anim.skinning.kernels.jit import jit
+from anim.skinning.kernels.jit import callee
 
 Vector: TypeAlias = tuple[float, float, float]
 Rotation: TypeAlias = tuple[float, float, float, float]  # a unit quaternion, x, y, z, w
 
 
-@jit
+@callee
 def add(a: Vector, scale: float, b: Vector) -> Vector:
     """Return a + scale · b."""
     return (a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2])
 
 
-@jit
+@callee
 def dot(a: Vector, b: Vector) -> float:
     """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@jit
+@callee
 def length(a: Vector) -> float:
     """Return the length."""
     return float(np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]))
 
 
-@jit
+@callee
 def rotate(q: Rotation, a: Vector) -> Vector:
     """Return a rotated by the unit quaternion q."""
     x, y, z, w = q
@@ -42,7 +42,7 @@ def rotate(q: Rotation, a: Vector) -> Vector:
     )
 
 
-@jit
+@callee
 def hermite(u: float, h: float, x0: Vector, v0: Vector, x1: Vector, v1: Vector) -> Vector:
     """Return the position at the fraction u of h on the cubic with these ends: of a parabola the parabola itself."""
     w = 1 - u
@@ -54,7 +54,7 @@ def hermite(u: float, h: float, x0: Vector, v0: Vector, x1: Vector, v1: Vector) 
     )
 
 
-@jit
+@callee
 def hermite_velocity(u: float, h: float, x0: Vector, v0: Vector, x1: Vector, v1: Vector) -> Vector:
     """Return the velocity at the fraction u of h > 0 on the same cubic."""
     w = 1 - u
