@@ -40,7 +40,8 @@ def clip(*tracks: Track, name: str = "") -> Clip:
 def skeleton(parents: Sequence[int], **rest: Any) -> Skeleton:
     """Return nodes "0", "1", … under these parents. rest: translation, rotation, scale; else none, none and 1."""
     n = len(parents)
-    parts = {"translation": np.zeros((n, 3)), "rotation": np.tile([0.0, 0, 0, 1], (n, 1)), "scale": np.ones((n, 3))}
+    rotation = np.tile([0.0, 0, 0, 1], (n, 1))
+    parts: dict[str, Any] = {"translation": np.zeros((n, 3)), "rotation": rotation, "scale": np.ones((n, 3))}
     parts |= {key: np.asarray(value, float) for key, value in rest.items()}
     return Skeleton(tuple(map(str, range(n))), np.array(parents, np.int64), **parts)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from anim.gltf.document import Json, json_array
-from anim.gltf.validation.channel_targets import EXTENSION, channel_target
+from anim.gltf.validation.channel_targets import EXTENSION, Target, channel_target
+from anim.model import parse_weight_pointer
 
 TRANSFORM = ("translation", "rotation", "scale", "matrix")
 MESH = ("mesh", "skin", "weights")
@@ -87,10 +88,17 @@ def _split(json: Json, number: int) -> int:
     for animation in json_array(json, "animations"):
         for channel in animation["channels"]:
             found = channel_target(channel)
-            if found is not None and found[:2] == (number, "weights"):
-                target = channel["target"]
-                if found[2] is None:
-                    target["node"] = index
-                else:
-                    target["extensions"][EXTENSION]["pointer"] = f"/nodes/{index}/weights"
+            if found is not None:
+                _redirect(channel["target"], found, number, index)
     return index
+
+
+def _redirect(target: Json, found: Target, old: int, new: int) -> None:
+    """Let a target of morph weights of a node, or of one of them, name another node, in place."""
+    node, path, pointer = found
+    single = parse_weight_pointer(pointer)
+    if (node, path) == (old, "weights") and pointer is None:
+        target["node"] = new
+    elif single is not None and (single.owner, single.index) == ("nodes", old):
+        end = "" if single.target is None else f"/{single.target}"
+        target["extensions"][EXTENSION]["pointer"] = f"/nodes/{new}/weights{end}"

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from anim.model.clip import Clip
+from anim.model.morphed_node import MorphedNode, WeightPointer, parse_weight_pointer
 from anim.model.pose import Pose
 from anim.model.scene import Mesh, MeshInstance, PrimitiveRange, Scene, Skin
 from anim.model.skeleton import Skeleton
@@ -21,6 +22,7 @@ __all__ = [
     "Mesh",
     "MeshInstance",
     "MeshPart",
+    "MorphedNode",
     "Pose",
     "PrimitiveRange",
     "Scene",
@@ -30,6 +32,8 @@ __all__ = [
     "Track",
     "ValueKind",
     "VertexCache",
+    "WeightPointer",
+    "parse_weight_pointer",
 ]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Bools, Floats, Ints
 from anim.errors import FormatError, ShapeError
+from anim.model.morphed_node import MorphedNode
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,6 +23,7 @@ class Skeleton:
     translation (N, 3) m, rotation (N, 4) unit xyzw, scale (N, 3): the rest pose, in the parent's space.
     sheared: (X,) indices of nodes with a `matrix` that has no translation, rotation, scale; they can't be animated.
     sheared_local: (X, 3, 4) local matrices of those.
+    morphed: the nodes with morph targets, for pointers to their weights.
     Skeletons compare by identity.
     """
 
@@ -32,6 +34,7 @@ class Skeleton:
     scale: Floats
     sheared: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     sheared_local: Floats = field(default_factory=lambda: np.empty((0, 3, 4)))
+    morphed: tuple[MorphedNode, ...] = ()
     _levels: Any = field(init=False, repr=False)  # tuple of (M,) for each depth
 
     def __setstate__(self, state: list[Any]) -> None:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.gltf.validation.channel_targets import is_shared_weights
-from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track
+from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track, parse_weight_pointer
 from anim.optimization.options import Drop
 from anim.optimization.search.context import Context
 from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
@@ -80,13 +79,13 @@ class _TrackSorter:
 
     def _sort(self, i: int, track: Track) -> None:
         policy, exact = self._context.policy, self._context.bounds.max_error == 0
-        if track.node is None or track.path == "pointer":
-            bound = 0.0 if is_shared_weights(track.pointer or "") else self._context.bounds.max_pointer_error
-            self._keep_track(i, key_reduction.reduce_pointer_keys(track, bound))  # of weights: they move vertices
+        if _is_weights(track):
+            if self._is_invisible(i):
+                self._dropped.append(i)
+        elif track.node is None:
+            self._keep_track(i, key_reduction.reduce_pointer_keys(track, self._context.bounds.max_pointer_error))
         elif self._is_invisible(i):
             self._dropped.append(i)
-        elif track.path == "weights":
-            pass
         elif (
             track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or self._is_off_unit(track)
         ):
@@ -118,6 +117,8 @@ class _TrackSorter:
 
     def _is_invisible(self, i: int) -> bool:
         node = self._clip.tracks[i].node
+        if node is None:
+            return False
         policy = self._context.policy
         return policy.drop_invisible and node not in policy.keep and bool(self._context.invisible[node])
 
@@ -146,22 +147,23 @@ class _TrackSorter:
     def _reduce_weights(self) -> None:
         """Reduce morph weights within their own fraction of the bound; the search gets the rest."""
         context = self._context
-        weights = [i for i, track in enumerate(self._clip.tracks) if track.path == "weights" and i not in self._done]
+        weights = [i for i, track in enumerate(self._clip.tracks) if _is_weights(track) and i not in self._dropped]
+        has_pointers = any(self._clip.tracks[i].node is None for i in weights)  # a node's track keeps them from it
         fraction = MORPH_BUDGET_FRACTION if self._free else MORPH_ONLY_BUDGET_FRACTION
         bound = fraction * self._task.bound / max(len(weights), 1)
         for i in weights:
             track = self._clip.tracks[i]
-            assert track.node is not None
-            reach = context.morph_reach(track.node)
+            reach = context.track_reach(track)
             exact = context.bounds.max_error == 0 or track.node in context.policy.keep
             if exact or not reach.size or track.interpolation is Interpolation.STEP:
                 self._keep_track(i, key_reduction.reduce_lossless(track))
                 continue
-            from_rest = morph_weights.weight_error(track, context.weights_at_rest(track.node), reach)
-            if self._is_droppable(i) and from_rest <= bound:
-                self._dropped.append(i)
-                self._spent += from_rest
-                continue
+            if track.node is not None and not has_pointers and self._is_droppable(i):
+                from_rest = morph_weights.weight_error(track, context.weights_at_rest(track.node), reach)
+                if from_rest <= bound:
+                    self._dropped.append(i)
+                    self._spent += from_rest
+                    continue
             new, stored, error = morph_weights.reduce_weights(
                 track, reach, bound, key_grid([track]), context.coding.packing
             )
@@ -244,6 +246,11 @@ def _with_ends(clip: Clip, every: dict[int, tuple[Track, EncodedKeys]], dropped:
     ordered = [every[i] for i in sorted(every)]
     tracks, stored = tuple(track for track, _ in ordered), tuple(each for _, each in ordered)
     return Solution(Clip(clip.name, tracks), stored, tuple(dropped))
+
+
+def _is_weights(track: Track) -> bool:
+    """Return whether a track animates morph weights, of a node or by a pointer to a mesh's or to a single one."""
+    return track.path == "weights" or (track.node is None and parse_weight_pointer(track.pointer) is not None)
 
 
 def _with_own_keys(track: Track) -> tuple[Track, EncodedKeys]:

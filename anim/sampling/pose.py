@@ -16,6 +16,8 @@ from anim.model import Clip, Interpolation, Pose, Skeleton, TimeAxis, ValueKind
 from anim.model.track import NUM_COMPONENTS
 from anim.sampling.batch import Batch, ConcatenatedTracks, MixedBatch, concatenate, mixed_batches
 from anim.sampling.track import KeyInterval, find_interval
+from anim.sampling.track import sample as sample_track
+from anim.sampling.weight_pointers import resolve_weight_pointers
 from anim.sampling.world import world_by_node
 
 Sampler: TypeAlias = Callable[[Batch | MixedBatch, Floats, KeyInterval], Floats]
@@ -44,7 +46,7 @@ class PoseSampler:
         self._skeleton = skeleton
         self._sample = sample
         nodes = len(skeleton)
-        moving = [track for track in clip.tracks if track.node is not None]
+        moving = [track for track in resolve_weight_pointers(skeleton, clip).tracks if track.node is not None]
         highest = max((track.node for track in moving if track.node is not None), default=-1)
         if highest >= nodes:
             raise NotFoundError(
@@ -164,8 +166,19 @@ def sample_clips(
             for i, track, values in zip(clip.tolist(), group.tracks, group.sample(at[clip]), strict=True):
                 if track.node is not None:
                     weights[i][track.node] = values
+    held = times if step_times is None else step_times
+    for morphs, clip_of_row, *at_row in zip(weights, clips, times, held, strict=True):
+        morphs.update(_pointed_weights(skeleton, clip_of_row, *at_row))
     translation, rotation, scale = (part.reshape(-1, *part.shape[2:]) for part in parts.values())
     return Pose(times.reshape(-1), translation, rotation, scale), weights
+
+
+def _pointed_weights(skeleton: Skeleton, clip: Clip, times: Floats, step_times: Floats) -> Iterator[tuple[int, Floats]]:
+    """Yield the nodes of a clip with pointers to morph weights, each with its weights (T, M)."""
+    resolved = resolve_weight_pointers(skeleton, clip)
+    for track in resolved.tracks if resolved is not clip else ():
+        if track.node is not None and track.path == "weights":
+            yield track.node, sample_track(track, step_times if track.interpolation is Interpolation.STEP else times)
 
 
 def rest_pose(skeleton: Skeleton) -> Pose:

@@ -8,8 +8,9 @@ from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.reader import INSTANCING, instanced_nodes
-from anim.gltf.validation.channel_targets import weight_pointers
-from anim.model import Scene
+from anim.gltf.validation.channel_targets import has_weight_pointers
+from anim.model import Scene, Skeleton, parse_weight_pointer
+from anim.sampling.weight_pointers import ineffective_weight_pointers
 from anim.skinning.analysis.weight_sums import unnormalized_weights
 from cli.text import Reporter
 
@@ -24,7 +25,7 @@ def read_scene(
     tangents: bool = False,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
-    """Return the scene of a document; warn of normalized skin weights, ignored mesh copies and ignored morph weights.
+    """Return the scene of a document; warn of normalized skin weights, ignored mesh copies and pointers without effect.
 
     name: of the file, for messages. normals, tangents: whether to read those too.
     nodes: gives the nodes of the command's meshes; None for all.
@@ -35,18 +36,25 @@ def read_scene(
         for words in bad.in_words():
             reporter.warn(f"{name}: {words}")
     _warn_of_copies(document, name, reporter, chosen)
-    _warn_of_weight_pointers(document, name, reporter)
+    _warn_of_weight_pointers(document, found.skeleton, name, reporter)
     return found
 
 
-def _warn_of_weight_pointers(document: Document, name: str, reporter: Reporter) -> None:
-    pointers = weight_pointers(document.json)
-    if pointers:
-        more = f" and {len(pointers) - 1} more" if len(pointers) > 1 else ""
-        reporter.warn(
-            f"{name}: morph weights by the pointer '{pointers[0]}'{more} are not evaluated: what they move is in no "
-            "figure, and in no bake"
-        )
+def _warn_of_weight_pointers(document: Document, skeleton: Skeleton, name: str, reporter: Reporter) -> None:
+    if not has_weight_pointers(document.json):
+        return
+    clips, _ = reader.readable_clips(document, Accessors(document))
+    found = [pointer for clip in clips.values() for pointer in ineffective_weight_pointers(skeleton, clip)]
+    for pointer in dict.fromkeys(found):
+        reporter.warn(f"{name}: the pointer '{pointer}' moves nothing: {_why_ineffective(skeleton, pointer)}")
+
+
+def _why_ineffective(skeleton: Skeleton, pointer: str) -> str:
+    target = parse_weight_pointer(pointer)
+    meshes = {each.mesh: len(each.weights) for each in skeleton.morphed}
+    if target is None or target.owner != "meshes" or (target.target or 0) >= meshes.get(target.index, 0):
+        return "no node has such morph weights"
+    return "all nodes with this mesh have weights of their own, which replace the mesh's"
 
 
 def _warn_of_copies(document: Document, name: str, reporter: Reporter, chosen: Collection[int] | None) -> None:

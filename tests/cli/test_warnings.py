@@ -22,7 +22,7 @@ from tests.cli.test_instancing import with_copies
 SUMS = "don't add up to 1"
 COPIES = "has copies of a mesh by EXT_mesh_gpu_instancing"
 JSON = ("--format", "json")
-WEIGHTS = "morph weights by the pointer '/nodes/1/weights/1' are not evaluated"
+POINTER = "the pointer '/nodes/1/weights/7' moves nothing: no node has such morph weights"
 REPORT = ("--report", "-", "--effort", "fast")
 WARNED = (  # command line, words of the warning, options that ask for the report; none where there is no report
     (("resample", "bad.glb", "out.glb", "--fps", "9"), SUMS, ()),
@@ -36,10 +36,10 @@ WARNED = (  # command line, words of the warning, options that ask for the repor
     (("resample", "copies.glb", "out.glb", "--fps", "9"), COPIES, ()),
     (("diff", "copies.glb", "copies.glb"), COPIES, JSON),
     (("optimize", "copies.glb", "out.glb", "--effort", "fast"), COPIES, REPORT),
-    (("resample", "pointer.glb", "out.glb", "--fps", "9"), WEIGHTS, ()),
-    (("bake", "pointer.glb", "out.npz", "--clip", "one_weight", "--fps", "4"), WEIGHTS, ()),
-    (("loop", "pointer.glb"), WEIGHTS, JSON),
-    (("optimize", "pointer.glb", "out.glb", "--effort", "fast"), WEIGHTS, REPORT),
+    (("resample", "lost.glb", "out.glb", "--fps", "9"), POINTER, ()),
+    (("bake", "lost.glb", "out.npz", "--clip", "weights", "--fps", "4"), POINTER, ()),
+    (("loop", "lost.glb"), POINTER, JSON),
+    (("optimize", "lost.glb", "out.glb", "--effort", "fast"), POINTER, REPORT),
     (("diff", "arm.glb", "biped.glb"), "no clip and no node has the same name", JSON),
     (("optimize", "arm.glb", "out.glb", "--max-error", "0.1", "--effort", "fast"), "0.1 means 0.1 m", REPORT),
     (
@@ -63,6 +63,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> Path:
         (tmp_path / f"{name}.glb").write_bytes(built(name))
     (tmp_path / "bad.glb").write_bytes(with_bad_sums(built("arm")))
     (tmp_path / "copies.glb").write_bytes(with_copies("arm"))
+    (tmp_path / "lost.glb").write_bytes(built("pointer").replace(b'"/nodes/1/weights/1"', b'"/nodes/1/weights/7"'))
     (tmp_path / "small.bvh").write_bytes(SMALL)
     return tmp_path
 
@@ -90,6 +91,7 @@ def test_warnings(line: tuple[str, ...], words: str, report: tuple[str, ...], fo
         (("collapse", "arm.glb"), JSON),
         (("diff", "arm.glb", "arm.glb"), JSON),
         (("optimize", "arm.glb", "out.glb", "--effort", "fast"), REPORT),
+        (("diff", "pointer.glb", "pointer.glb"), JSON),
     ],
 )
 def test_reports_of_sound_files_have_no_warnings(

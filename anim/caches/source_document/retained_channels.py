@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from anim.gltf.document import Json, json_array
 from anim.gltf.validation import channel_targets, hierarchy
-
-_MESH_WEIGHTS = re.compile(r"/meshes/([0-9]+)/weights(/|$)")
+from anim.model import parse_weight_pointer
 
 
 def drop_unused_skins(json: Json) -> None:
@@ -28,18 +26,19 @@ def retained_channels(
     keep_skeleton: keep all others.
     """
     nodes = _moving_nodes(source, edited, baked, keep_skeleton=keep_skeleton) - set(roots)
-    meshes = {source["nodes"][i]["mesh"] for i in baked}
-    return [each for each in animation["channels"] if _is_retained(each, nodes, meshes, baked)]
+    morphed = {i: node["mesh"] for i, node in enumerate(source["nodes"]) if "mesh" in node and i not in baked}
+    return [each for each in animation["channels"] if _is_retained(each, nodes, morphed, baked)]
 
 
-def _is_retained(channel: Json, nodes: Collection[int], meshes: Collection[int], baked: Collection[int]) -> bool:
+def _is_retained(channel: Json, nodes: Collection[int], meshes: Mapping[int, int], baked: Collection[int]) -> bool:
+    """meshes: by node, of those that were not baked."""
     target = channel_targets.channel_target(channel)
     if target is None:
         return True
     node, path, pointer = target
     if node is None:
-        found = _MESH_WEIGHTS.match(pointer or "")
-        return found is None or int(found[1]) not in meshes
+        found = parse_weight_pointer(pointer)
+        return found is None or found.index in (meshes if found.owner == "nodes" else meshes.values())
     return node not in baked if path == "weights" else node in nodes
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameter, Parameters, Rule
+from anim.sampling.weight_pointers import resolve_weight_pointers
 
 MIN_WEIGHT = 1e-6
 
@@ -16,7 +17,8 @@ MIN_WEIGHT = 1e-6
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the largest number at a key."""
     for report, clip in file.clips():
-        weights = [track.values for track in clip.tracks if track.path == "weights"]
+        tracks = resolve_weight_pointers(file.skeleton, clip).tracks
+        weights = [track.values for track in tracks if track.path == "weights"]
         most = max((int((np.abs(values) > MIN_WEIGHT).sum(axis=1).max()) for values in weights), default=0)
         if most > parameters["targets"]:
             yield file.in_clip(report.index, value=most)

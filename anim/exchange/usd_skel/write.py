@@ -19,6 +19,7 @@ from anim.exchange.usd_skel.stage import StageBuilder, StageTimes
 from anim.gltf.document import Document
 from anim.model import Clip, Scene
 from anim.sampling.times import check_fps
+from anim.sampling.weight_pointers import resolve_weight_pointers
 
 USD_FORMATS = (".usdz", ".usdc", ".usda")
 DEFAULT_FPS = 60.0  # of clips whose keys are on the frames of no common rate
@@ -70,7 +71,7 @@ def write(
 def _left_out(document: Document, scene: Scene, clip: Clip) -> list[str]:
     """Notes on what is not written."""
     found = node_loss_notes(document.json)
-    if any(track.path == "pointer" for track in clip.tracks):
+    if any(track.path == "pointer" for track in resolve_weight_pointers(scene.skeleton, clip).tracks):
         found.append("channels of KHR_animation_pointer are left out")
     if any(len(each.mesh.positions) and not len(each.mesh.faces) for each in scene.instances):
         found.append("meshes of points and lines are left out")

@@ -13,7 +13,7 @@ from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import Meshes
 from anim.gltf.validation import hierarchy
-from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin
+from anim.model import Clip, MeshInstance, MorphedNode, Scene, Skeleton, Skin
 
 MAX_LISTED_CLIPS = 3  # clips in a message
 INSTANCING = "EXT_mesh_gpu_instancing"
@@ -46,6 +46,7 @@ def skeleton(document: Document) -> Skeleton:
         scale,
         np.array(list(sheared), np.int64),
         np.array(list(sheared.values())).reshape(-1, 3, 4),
+        _morphed_nodes(document.json),
     )
 
 
@@ -234,6 +235,23 @@ def _skin(number: int, skin: Json, accessors: Accessors) -> Skin:
         return Skin(joints, accessors.matrices(skin["inverseBindMatrices"])[: len(joints), :3])
     except AnimError as error:
         raise error.at(f"skin {number}") from None
+
+
+def _morphed_nodes(json: Json) -> tuple[MorphedNode, ...]:
+    """The nodes with morph targets, with their weights at rest; without those that `scene` refuses."""
+    primitives = (mesh["primitives"] for mesh in json_array(json, "meshes"))
+    counts = [max((len(each.get("targets", ())) for each in of_mesh), default=0) for of_mesh in primitives]
+    if not any(counts):
+        return ()
+    found = []
+    for i, node in enumerate(json_array(json, "nodes")):
+        mesh = node.get("mesh", -1)
+        if not 0 <= mesh < len(counts) or not counts[mesh]:
+            continue
+        weights = node.get("weights") or json["meshes"][mesh].get("weights") or [0.0] * counts[mesh]
+        if len(weights) == counts[mesh]:
+            found.append(MorphedNode(i, mesh, tuple(map(float, weights)), bool(node.get("weights"))))
+    return tuple(found)
 
 
 def _weights_at_rest(node: Json, of_mesh: Floats) -> Floats:

@@ -7,11 +7,11 @@ from typing import TypeAlias
 
 from anim.errors import FormatError, NotFoundError, RangeError
 from anim.gltf.document import Json, json_array
+from anim.model import parse_weight_pointer
 from anim.model.track import PATHS
 
 EXTENSION = "KHR_animation_pointer"
 _NODE_PROPERTY = re.compile(r"/nodes/(0|[1-9][0-9]{0,8})/(translation|rotation|scale|weights)")
-_WEIGHTS = re.compile(r"/(?:nodes|meshes)/(0|[1-9][0-9]{0,8})/weights(/(0|[1-9][0-9]{0,8}))?")
 
 Target: TypeAlias = tuple[int | None, str, str | None]  # node, path, pointer
 
@@ -78,19 +78,11 @@ def _check(target: Target, nodes: list[Json], seen: set[tuple[int, str]]) -> Non
         raise FormatError(f"names node {node} (the file has {len(nodes)} nodes)")
 
 
-def is_shared_weights(pointer: str) -> bool:
-    """Return True for a pointer to morph weights of a mesh, or to a single one, which no path of a node stands for.
-
-    is_shared_weights("/meshes/0/weights") → True, is_shared_weights("/nodes/0/weights") → False
-    """
-    return _WEIGHTS.fullmatch(pointer) is not None and _NODE_PROPERTY.fullmatch(pointer) is None
-
-
-def weight_pointers(json: Json) -> list[str]:
-    """Return the distinct pointers of channels to morph weights of a mesh, or to a single one, in their order."""
-    channels = [channel for animation in json_array(json, "animations") for channel in animation["channels"]]
-    pointers = [found[2] or "" for found in map(channel_target, channels) if found is not None and found[0] is None]
-    return list(dict.fromkeys(filter(is_shared_weights, pointers)))
+def has_weight_pointers(json: Json) -> bool:
+    """Return whether a channel points to morph weights of a mesh, or to a single one, which have no path of a node."""
+    channels = (channel for animation in json_array(json, "animations") for channel in animation["channels"])
+    targets = map(channel_target, channels)
+    return any(found is not None and found[0] is None and parse_weight_pointer(found[2]) for found in targets)
 
 
 def _pointer_target(extension: object) -> Target | None:

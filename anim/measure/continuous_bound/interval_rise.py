@@ -14,6 +14,7 @@ from anim.measure.continuous_bound.node_bounds import world_bounds
 from anim.measure.continuous_bound.second_derivative import second_derivative_bound
 from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.model import Clip, Scene
+from anim.sampling.weight_pointers import resolve_weight_pointers
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,9 @@ def interval_rise(
     longest: s, intervals between keys up to this duration are bounded as one; shorter ones cost more and bound better.
     Source: |f(t)| ≤ max(|f(0)|, |f(h)|) + h²/8 · sup|f″|, since f minus its chord is bounded by the second term.
     """
-    first, second = partition_tracks(scenes, clips)
-    where = merge_intervals(times, *clips, longest=longest)
+    resolved = tuple(resolve_weight_pointers(s.skeleton, clip) for s, clip in zip(scenes, clips, strict=True))
+    first, second = partition_tracks(scenes, (resolved[0], resolved[1]))
+    where = merge_intervals(times, *resolved, longest=longest)
     with np.errstate(all="ignore"):  # without a bound: inf or nan
         nodes = world_bounds(first, second, where, players=players)
         each = [second_derivative_bound(reach, nodes, first, second, where) for reach in reaches]

@@ -29,6 +29,7 @@ from anim.model.time_axis import merge_times
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.sampling.times import check_fps, frame_times
+from anim.sampling.weight_pointers import resolve_weight_pointers
 
 NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no vertex is searched
 SLACK = 1.001  # factor: a bound this close to a found error is not refined
@@ -203,7 +204,10 @@ class ErrorMetric:
                     place = part.name_of(found) or self.called(joint)
             first += count
         time = float(times[frame]) if len(times) else 0.0
-        fraction, pointer = pointer_error(before, after, times)
+        old, new = (
+            resolve_weight_pointers(s.skeleton, clip) for s, clip in ((self.scene, before), (self.other, after))
+        )
+        fraction, pointer = pointer_error(old, new, times)
         return MotionError(size, time, place, self.called(joint), len(times), fraction, pointer, vertex), worst, only
 
     def _blocks_of_players(self, before: Clip, after: Clip, times: Floats, players: Sequence[str]) -> Iterator[Block]:

@@ -12,7 +12,7 @@ from anim.measure.error import point_matrix as points_
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.shell_points import nodes_without_vertices
 from anim.measure.error.surface import Surface, has_vertices, surfaces
-from anim.model import Clip, Scene, Skeleton
+from anim.model import Clip, Scene, Skeleton, Track, parse_weight_pointer
 from anim.optimization.options import Bounds, Effort, Policy
 from anim.optimization.tracks import morph_weights
 from anim.optimization.tracks.quantization import Encoding
@@ -44,6 +44,23 @@ class Context:
     def morph_reach(self, node: int) -> Floats:
         """Return the displacement (M, V), m, of each vertex by each morph target of a node at weight 1."""
         return morph_weights.influence_radius(self.surfaces, node, self.widening(node))
+
+    def track_reach(self, track: Track) -> Floats:
+        """Return the displacement (C, V), m, of each vertex that weights of a track move, by each at weight 1."""
+        if track.node is not None:
+            return self.morph_reach(track.node)
+        pointer = parse_weight_pointer(track.pointer)
+        assert pointer is not None
+        moved = [
+            self.morph_reach(each.node)
+            for each in self.skeleton.morphed
+            if (each.node if pointer.owner == "nodes" else each.mesh) == pointer.index
+        ]
+        moved = [each for each in moved if each.size]
+        if not moved:
+            return np.zeros((0, 0))
+        every = np.concatenate(moved, axis=1)
+        return every if pointer.target is None else every[pointer.target : pointer.target + 1]
 
     def weights_at_rest(self, node: int) -> Floats:
         """Return the morph weights (M,) of a node in the rest pose."""

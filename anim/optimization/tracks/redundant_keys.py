@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from anim.model import Clip, Skeleton, Track
+from anim.model import Clip, Skeleton, Track, parse_weight_pointer
 from anim.model.track import share_time_axes
 from anim.optimization.options import Request
 from anim.optimization.search.plan import Solution
@@ -30,7 +30,7 @@ def drop_redundant_keys(solution: Solution, skeleton: Skeleton, request: Request
 
 
 def _is_exact(track: Track, request: Request) -> bool:
-    if track.node is None:
+    if track.node is None and parse_weight_pointer(track.pointer) is None:
         return request.bounds.max_pointer_error == 0
     return request.bounds.max_error == 0 or track.node in request.policy.keep
 

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-from anim.gltf.document import Json, json_array
-from anim.gltf.reading.accessors import FLOAT, Accessors
-from anim.gltf.validation.channel_targets import channel_target
+import numpy as np
+
+from anim.gltf.document import Document, Json, json_array
+from anim.gltf.reading import reader
+from anim.gltf.validation.channel_targets import channel_target, has_weight_pointers
+from anim.gltf.writing import writer
+from anim.model import Clip
+from anim.sampling.weight_pointers import resolve_weight_pointers
 from anim.show.page.embedded_nodes import shown_nodes
 from anim.units import plural
 
 MAX_LISTED_POINTERS = 3  # pointers in a note
-_MESH_WEIGHTS = re.compile(r"/meshes/(0|[1-9][0-9]{0,8})/weights")
 
 
-def rewrite_tracks(json: Json, accessors: Accessors) -> list[str]:
-    """Replace pointers by plain channels, in place, and return notes about tracks not shown.
+def resolve_pointers(document: Document) -> Document:
+    """Return the document with plain channels of morph weights where pointers name a mesh's, or a single one.
 
-    Pointers to a mesh's weights become a channel for each node with the mesh, unless one has weights of its own.
+    Not of clips in which one of several pointers to weights of a node jumps while others don't.
+    """
+    if not has_weight_pointers(document.json):
+        return document
+    skeleton, clips = reader.skeleton(document), reader.clips(document)
+    resolved = ((i, clip, resolve_weight_pointers(skeleton, clip)) for i, clip in enumerate(clips))
+    return writer.replace_clips(document, {i: new for i, old, new in resolved if new is not old and _is_storable(new)})
+
+
+def rewrite_tracks(json: Json) -> list[str]:
+    """Replace pointers to properties of nodes by plain channels, in place, and return notes about tracks not shown.
+
     Channels of nodes outside the default scene, or of a path that glTF does not know, lose their target: three.js
     finds none for them.
     """
@@ -31,12 +45,9 @@ def rewrite_tracks(json: Json, accessors: Accessors) -> list[str]:
             node, path, pointer = channel_target(channel) or (None, "", None)
             if node is not None:
                 channels.append({**channel, "target": {"node": node, "path": path}} if pointer else channel)
-            elif pointer is not None:
-                plain = _mesh_weights(json, animation, channel, pointer, accessors)
-                channels += plain or [channel]
-                pointers += [] if plain else [pointer]
             else:
                 channels.append(channel)
+                pointers += [] if pointer is None else [pointer]
         for i, channel in enumerate(channels):
             target, is_known = channel["target"], channel_target(channel) is not None
             if "node" in target and (not is_known or target["node"] not in shown):
@@ -46,25 +57,9 @@ def rewrite_tracks(json: Json, accessors: Accessors) -> list[str]:
     return _notes(pointers, outside)
 
 
-def _mesh_weights(json: Json, animation: Json, channel: Json, pointer: str, accessors: Accessors) -> list[Json]:
-    """Channels of the nodes that a pointer to a mesh's weights moves; none where that is not exact."""
-    match = _MESH_WEIGHTS.fullmatch(pointer)
-    meshes, nodes = json_array(json, "meshes"), json_array(json, "nodes")
-    if match is None or int(match[1]) >= len(meshes):
-        return []
-    mesh = int(match[1])
-    users = [i for i, node in enumerate(nodes) if node.get("mesh") == mesh]
-    targets = {channel_target(each) for each in animation["channels"]}
-    if any("weights" in nodes[i] or (i, "weights") in {each[:2] for each in targets if each} for i in users):
-        return []
-    sampler, primitives = animation["samplers"][channel["sampler"]], meshes[mesh]["primitives"]
-    output, keys = accessors.about(sampler["output"]), accessors.about(sampler["input"])["count"]
-    width = len(primitives[0].get("targets", ())) if primitives else 0
-    rows = keys * (3 if sampler.get("interpolation") == "CUBICSPLINE" else 1)
-    stored = output["type"] == "SCALAR" and (output["componentType"] == FLOAT or output.get("normalized", False))
-    if not width or not stored or output["count"] != rows * width:
-        return []
-    return [{**channel, "target": {"node": node, "path": "weights"}} for node in users]
+def _is_storable(clip: Clip) -> bool:
+    """Return whether float32 tells the keys of every track apart; not those around jumps beside other motion."""
+    return all((np.diff(axis.times.astype(np.float32)) > 0).all() for axis in clip.time_axes)
 
 
 def _notes(pointers: Sequence[str], outside: int) -> list[str]:

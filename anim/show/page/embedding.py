@@ -19,7 +19,7 @@ from anim.show.page.embedded_images import embed_images
 from anim.show.page.embedded_names import separate_meshes, separate_names
 from anim.show.page.embedded_nodes import show_scene
 from anim.show.page.embedded_references import drop_references
-from anim.show.page.embedded_tracks import rewrite_tracks
+from anim.show.page.embedded_tracks import resolve_pointers, rewrite_tracks
 from anim.show.page.packing import Packing
 from anim.show.page.sticks import add_sticks
 
@@ -49,10 +49,10 @@ class Embedded:
 def embed(document: Document, resolve: Resolve | None = None) -> Embedded:
     """Return a document as one GLB for three.js, which reads no other file and no network.
 
-    Buffers and images are packed in. Pointers to a node's translation, rotation, scale or weights become plain
-    channels, Draco becomes plain accessors; images that cannot be read are left out of their materials; a file without
-    a mesh gets sticks; names that three.js takes for one differ; there are no cameras. Everything else is unchanged,
-    and so is `document`. meshopt stays compressed.
+    Buffers and images are packed in. Pointers to a node's translation, rotation, scale, or to morph weights become
+    plain channels, Draco becomes plain accessors; images that cannot be read are left out of their materials; a file
+    without a mesh gets sticks; names that three.js takes for one differ; there are no cameras. Everything else is
+    unchanged, and so is `document`. meshopt stays compressed.
     resolve: returns the bytes of a file in the input's folder by its relative path; None if the input has no folder.
     Raises FormatError or UnsupportedError if clips or meshes cannot be read.
     """
@@ -63,9 +63,10 @@ def embed(document: Document, resolve: Resolve | None = None) -> Embedded:
     if not any("mesh" in node for node in json_array(document.json, "nodes")) and not notes:
         document, bare = add_sticks(document), document
         notes += [] if document is bare else ["no mesh: shown as sticks from joint to joint"]
+    document = resolve_pointers(document)
     json, packing = copy_json(document.json), Packing(document)
     notes += show_scene(json)
-    notes += rewrite_tracks(json, Accessors(document))
+    notes += rewrite_tracks(json)
     notes += drop_references(json)
     separate_meshes(json)
     notes += separate_names(json)

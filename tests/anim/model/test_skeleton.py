@@ -59,7 +59,9 @@ def test_nobody_writes_into_a_skeleton() -> None:
     sheared[0], local[0] = 1, 7
     assert tree.sheared.tolist() == [0]
     assert not tree.sheared_local.any()
-    arrays = [getattr(tree, each.name) for each in fields(tree) if each.init and each.name != "names"] + tree.levels()
+    parts = [getattr(tree, each.name) for each in fields(tree) if each.init]
+    arrays = [each for each in parts if isinstance(each, np.ndarray)] + tree.levels()
+    assert len(arrays) == 8
     assert [array.flags.writeable for array in arrays] == [False] * len(arrays)
     with pytest.raises(ShapeError, match="sheared_local has 2 matrices for 1 nodes"):
         replace(tree, sheared_local=np.zeros((2, 3, 4)))

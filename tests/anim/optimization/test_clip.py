@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,10 +86,11 @@ def test_kept_nodes_are_exact() -> None:
 
 
 def test_unseen_nodes_go_only_where_that_is_asked_for() -> None:
-    socket = replace(REST, names=(*REST.names, "socket"), parents=np.r_[REST.parents, 2], **{
+    parts: dict[str, Any] = {
         path: np.vstack((getattr(REST, path), row))
         for path, row in (("translation", [0, 1, 0]), ("rotation", [0, 0, 0, 1]), ("scale", [1, 1, 1]))
-    })  # fmt: skip
+    }
+    socket = replace(REST, names=(*REST.names, "socket"), parents=np.r_[REST.parents, 2], **parts)
     of = replace(OF, skeleton=socket)
     number = len(socket) - 1
     what = clip(*waving().tracks, track("rotation", TIMES, turning(1.0), node=number))
