@@ -1,6 +1,6 @@
 """Joint transforms of a UsdSkelAnimation: translation and rotation in float32, scale in float16.
 
-float16 is too coarse for a scale such as 0.01: uniform scales that do not change go into the bind transforms and the
+float16 is too coarse for a scale such as 0.01: uniform scales that do not change go into the bind pose and the
 translations of the children. Translations correct the rounding of the joints above.
 """
 
@@ -17,6 +17,8 @@ from anim.model import Pose
 from anim.sampling.pose import PosedSkeleton
 
 CONSTANT_SCALE_TOLERANCE = 1e-6  # relative
+FLOAT16_ROUNDING = 5e-4  # relative
+MIN_STORED_SCALE = 1e-3  # smaller ones have fewer digits in float16
 MIN_DETERMINANT = 1e-12  # of a parent's matrix whose rounding can be corrected
 
 
@@ -38,15 +40,40 @@ class JointSamples:
 
 
 def constant_scales(group: SkeletonGroup, pose: Pose) -> Floats:
-    """Return the product (J,) of the constant uniform scales of each joint and those above it, within a skeleton."""
-    own = np.ones(len(group.joints))
+    """Return the product (J,) of constant uniform scales of each joint and those above it that are not animated.
+
+    Those are in the bind transforms, which then have one scale in common: Blender's bones have none. A joint with
+    vertices that has another scale in its clip than at bind time keeps the quotient in its animation.
+    """
+    own = np.full(len(group.joints), np.nan)
     for i, node in enumerate(group.joints):
         scale = pose.scale[:, node]
         if scale[0, 0] and _is_constant(scale, scale[0, 0]):
             own[i] = scale[0, 0]
+    whole, bind = _products(group, np.nan_to_num(own, nan=1.0)), group.bind_scales()
+    is_bound = np.isfinite(bind)
+    wanted = bind / np.median((bind / np.abs(whole))[is_bound]) if is_bound.any() else bind
+    found = np.ones(len(group.joints))
     for i, parent in enumerate(group.parents.tolist()):
-        own[i] *= own[parent] if parent >= 0 else 1.0
-    return own
+        found[i] = found[parent] if parent >= 0 else 1.0
+        if np.isfinite(own[i]):
+            found[i] *= own[i] / _stored_scale(abs(found[i] * own[i]) / wanted[i])
+    return found
+
+
+def _products(group: SkeletonGroup, own: Floats) -> Floats:
+    """The product (J,) of each joint's own factor and those above it."""
+    found = own.copy()
+    for i, parent in enumerate(group.parents.tolist()):
+        found[i] *= found[parent] if parent >= 0 else 1.0
+    return found
+
+
+def _stored_scale(ratio: float) -> float:
+    """The scale for the animation near `ratio` that float16 stores: 1 if it is within its rounding, or unknown."""
+    if not MIN_STORED_SCALE < ratio < 1 / MIN_STORED_SCALE or abs(ratio - 1) < FLOAT16_ROUNDING:
+        return 1.0
+    return float(np.float16(ratio))
 
 
 def scale_remainders(group: SkeletonGroup, pose: Pose, constant: Floats) -> Floats:

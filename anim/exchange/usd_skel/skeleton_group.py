@@ -37,6 +37,21 @@ class SkeletonGroup:
     inverse_bind: dict[int, Floats] = field(default_factory=dict)
     members: list[tuple[MeshInstance, Floats]] = field(default_factory=list)
 
+    def bind_scales(self) -> Floats:
+        """Return the scale (J,) of each joint's bind transform, skeleton_from_joint; nan of joints without weight."""
+        found = np.full(len(self.joints), np.nan)
+        used = set[int]()
+        for instance, _ in self.members:
+            if instance.skin is None:
+                used.add(instance.node)
+            else:
+                carrying = np.unique(instance.mesh.joints[instance.mesh.weights > 0])
+                used.update(instance.skin.joints[carrying].tolist())
+        for i, node in enumerate(self.joints):
+            if node in used and node in self.inverse_bind:
+                found[i] = abs(float(np.linalg.det(self.inverse_bind[node][:3, :3]))) ** (-1 / 3)
+        return found
+
 
 def group_skeletons(
     scene: Scene, instances: Sequence[MeshInstance], animated: Container[int] = ()

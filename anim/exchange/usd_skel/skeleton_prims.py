@@ -9,7 +9,13 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats.usd_stage import vectors
-from anim.exchange.usd_skel.joint_samples import JointSamples, constant_scales, joint_samples, scale_remainders
+from anim.exchange.usd_skel.joint_samples import (
+    CONSTANT_SCALE_TOLERANCE,
+    JointSamples,
+    constant_scales,
+    joint_samples,
+    scale_remainders,
+)
 from anim.exchange.usd_skel.node_prims import plain_text, set_samples
 from anim.exchange.usd_skel.prim_names import joint_paths
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup
@@ -23,6 +29,8 @@ class SkeletonPrim:
     """A skeleton in a stage, with its animation.
 
     path: of the prim. rest, posed: the nodes in their rest pose and at the time codes.
+    bind_scale: factor of the bind pose, for the meshes' matrices into it; with it bind transforms have no scale, which
+    Blender ignores.
     """
 
     def __init__(
@@ -40,7 +48,9 @@ class SkeletonPrim:
         prim.CreateJointsAttr(paths)
         if group.joints and len(set(names)) == len(names):
             prim.CreateJointNamesAttr([plain_text(name) for name in names])
-        prim.CreateBindTransformsAttr(_matrices(_bind_transforms(group, rest, factors)))
+        bind, unit = _bind_transforms(group, rest, factors)
+        self.bind_scale = unit
+        prim.CreateBindTransformsAttr(_matrices(bind))
         prim.CreateRestTransformsAttr(_matrices(at_rest))
         self._animation = UsdSkel.Animation.Define(stage, f"{path}/animation")
         self._animation.CreateJointsAttr(paths)
@@ -77,21 +87,33 @@ class SkeletonPrim:
             set_samples(attribute, [make(np.ascontiguousarray(row)) for row in values], self._codes, values)
 
 
-def _bind_transforms(group: SkeletonGroup, rest: PosedSkeleton, factors: Floats) -> Floats:
-    """skeleton_from_joint (J, 4, 4) at bind time; of joints that no skin has, those of the rest pose.
+def _bind_transforms(group: SkeletonGroup, rest: PosedSkeleton, factors: Floats) -> tuple[Floats, float]:
+    """skeleton_from_joint (J, 4, 4) at bind time, and the scale of that pose; without a skin those of the rest pose.
 
     factors: (J, 3) of scales that are not in the animation.
     """
     if not group.joints:
-        return np.eye(4)[None]
+        return np.eye(4)[None], 1.0
     anchor = np.eye(4)[:3] if group.anchor < 0 else rest.world[group.anchor, 0]
     found = _square(matrix.multiply(matrix.inverse(anchor), rest.world[list(group.joints), 0]))
-    found[:, :3, :3] /= factors[:, None]
-    for i, node in enumerate(group.joints):
-        bind = group.inverse_bind.get(node)
-        if bind is not None:
-            found[i] = np.linalg.inv(np.diag([*factors[i], 1.0]) @ bind)
-    return found
+    of_skins = [i for i, node in enumerate(group.joints) if node in group.inverse_bind]
+    for i in of_skins:
+        found[i] = np.linalg.inv(np.diag([*factors[i], 1.0]) @ group.inverse_bind[group.joints[i]])
+    is_bound = np.isfinite(group.bind_scales())
+    found[~is_bound, :3, :3] = _without_scale(found[~is_bound, :3, :3])  # no vertex follows these
+    lengths = np.abs(np.linalg.det(found[is_bound, :3, :3])) ** (1 / 3)
+    scale = float(np.median(lengths)) if len(lengths) else 1.0
+    if abs(scale - 1) <= CONSTANT_SCALE_TOLERANCE:
+        return found, 1.0
+    found[of_skins, :3, 3] /= scale
+    found[is_bound, :3, :3] /= scale
+    return found, 1 / scale
+
+
+def _without_scale(axes: Floats) -> Floats:
+    """Matrices (J, 3, 3) with columns of length 1; those of length 0 stay."""
+    lengths = np.linalg.norm(axes, axis=1, keepdims=True)
+    return np.asarray(axes / np.where(lengths > 0, lengths, 1.0))
 
 
 def _square(affine: Floats) -> Floats:

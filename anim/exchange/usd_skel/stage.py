@@ -90,7 +90,8 @@ class StageBuilder:
         made = SkeletonPrim(self._stage, path, group, self._rest, self._posed, self._times.codes)
         number = {node: i for i, node in enumerate(group.joints)}
         names, weights, taken = list[str](), list[Floats](), set[str]()
-        for instance, to_skeleton in group.members:
+        for instance, to_bind in group.members:
+            to_skeleton = np.diag([made.bind_scale] * 3 + [1.0]) @ to_bind
             prim = self._mesh(instance, group.anchor)
             binding = UsdSkel.BindingAPI.Apply(prim.GetPrim())
             binding.CreateSkeletonRel().SetTargets([path])
