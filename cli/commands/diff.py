@@ -12,6 +12,7 @@ import numpy as np
 import typer
 
 from anim.gltf.document import Document
+from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
@@ -34,7 +35,6 @@ from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length
 from cli.workflows.diff_plot import check_plot, draw_errors
-from cli.workflows.vertex_diff import diff_by_vertex, is_cache
 from cli.workflows.vertex_motion import is_bake_of, pages_of
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
@@ -117,7 +117,7 @@ def command(
         if new is None or player is not SPEC:
             raise UsageError("--html shows two files as glTF specifies (expected neither --player nor --players)")
     one = other = None
-    if not (is_cache(old) or is_cache(new)):
+    if not (_is_cache(old) or _is_cache(new)):
         one = _opened(old, reporter)
         other = one if new is None else _opened(new, reporter)
     if new is not None and (one is None or other is None or _are_bake_and_source(one, other)):
@@ -126,6 +126,8 @@ def command(
         opened = {
             side.file.name: (side.document, side.file.size, side.scene) for side in (one, other) if side is not None
         }
+        from cli.workflows.vertex_diff import diff_by_vertex
+
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, reporter, opened=opened)
         if html is not None:
             from cli.workflows.cache_page import write_vertex_page
@@ -181,6 +183,15 @@ def _write_page(
     content = compare_content(ruler, one[1].clips, other[1].clips, pairs)
     files = [page_file(name, side.document, side.file.size) for name, side in (one, other)]
     write_page(path, files[0], files[1], reporter, content=content, view=worst_view(files[0], content))
+
+
+def _is_cache(path: str | None) -> bool:
+    """Return whether a path has the file extension of a cache that is no glTF."""
+    if PurePath(path or "").suffix.lower() in ("", *container.SUFFIXES):
+        return False
+    from cli.workflows.vertex_diff import is_cache  # imports all cache formats
+
+    return is_cache(path)
 
 
 def _are_bake_and_source(one: _Side, other: _Side) -> bool:

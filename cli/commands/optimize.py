@@ -19,15 +19,12 @@ from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, PLAYERS, Drop, Objective, Packing, Policy, Reference, Request
 from cli.errors import UsageError
 from cli.io import documents
-from cli.io.page_output import check_page, page_file, write_page
 from cli.options import common
 from cli.reports import optimize_json, optimize_report
-from cli.reports.page_panels import size_panels
 from cli.text import Reporter
 from cli.workflows import many_files, optimize_job
 from cli.workflows.edit_clips import note_images
 from cli.workflows.optimize_job import OptimizeJob
-from cli.workflows.page_comparison import compare_files, worst_view
 from cli.workflows.rate_curve import check_curve_file, write_curve
 
 
@@ -244,6 +241,8 @@ class _Outputs:
         if out is not None and (self.report is not None or self.curve is not None):
             raise UsageError(f"--{'curve' if self.report is None else 'report'} is about one file: leave out --out")
         if self.html is not None:
+            from cli.io.page_output import check_page  # imports readers of all formats, as in the function below
+
             check_page(self.html, "--html")
             if out is not None or self.curve is not None:
                 raise UsageError(f"--html goes with neither --{'out' if self.curve is None else 'curve'}")
@@ -307,6 +306,10 @@ def _check_report(report: str, input: str, output: str) -> None:
 
 def _write_comparison(html: str, input: str, about: optimize_report.OptimizeReport, reporter: Reporter) -> None:
     """Write the page that compares the model before and after."""
+    from cli.io.page_output import page_file, write_page
+    from cli.reports.page_panels import size_panels
+    from cli.workflows.page_comparison import compare_files, worst_view
+
     before = page_file(input, about.before, about.size_before)
     after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
     content = compare_files(before, after, reporter)

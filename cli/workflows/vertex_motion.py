@@ -8,16 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
-from anim.caches.formats.flipbook_reader import read_pages
 from anim.caches.source_document.bake_source import BAKED_SUFFIX, baked_meshes
 from anim.caches.transforms import statistics
 from anim.caches.transforms.resample import resample_frames
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import RangeError
-from anim.gltf.document import Document
+from anim.gltf.document import Document, json_array
 from anim.model import Clip, Mesh, MeshInstance, Scene, VertexCache
 from anim.sampling.times import frame_times
-from anim.skinning.bake import bake
 
 TARGET_TOLERANCE = 1e-3  # of the largest offset, of targets that are stored as integers
 
@@ -39,6 +37,8 @@ class VertexMotion:
         if isinstance(self.source, VertexCache):
             cache = resample_frames(self.source, times)
         else:
+            from anim.skinning.bake import bake  # `diff` of two clips imports no skinning
+
             scene, clip, nodes = self.source
             cache = bake(scene, clip, times=times, rigid=True, nodes=nodes)
         for chunk in cache.chunks():
@@ -48,6 +48,8 @@ class VertexMotion:
         """Return the size of the model in metres, at rest."""
         if isinstance(self.source, VertexCache):
             return statistics.diagonal(self.source)
+        from anim.skinning.bake import bake
+
         scene, clip, nodes = self.source
         return statistics.diagonal(bake(scene, clip, times=self.keys[:1], rigid=True, nodes=nodes))
 
@@ -87,6 +89,10 @@ def cache_motion(cache: VertexCache) -> VertexMotion:
 
 def pages_of(document: Document) -> VertexCache | None:
     """Return the flip-book in a document, or None."""
+    if not any(isinstance(node.get("extras"), dict) for node in json_array(document.json, "nodes")):
+        return None
+    from anim.caches.formats.flipbook_reader import read_pages  # imports the writers of caches
+
     return read_pages(document)
 
 

@@ -102,10 +102,15 @@ def diff(
         tuple(i for i in wanted if partners[i] < 0),
         () if chosen is not None else tuple(i for i in range(len(new)) if i not in taken),
         _names(ruler.scene, np.flatnonzero(nodes < 0)),
-        _names(ruler.other, np.setdiff1d(np.arange(len(ruler.other.skeleton)), nodes)),
+        _names(ruler.other, _missing(nodes, len(ruler.other.skeleton))),
         ruler.pairs.by_vertex,
         (*_mesh_warnings(ruler.pairs), *_end_warnings(found)),
     )
+
+
+def _missing(nodes: Ints, count: int) -> Ints:
+    """Indices below `count` that are not in `nodes`; np.setdiff1d loads a quarter of numpy for that."""
+    return np.flatnonzero(np.bincount(nodes[nodes >= 0], minlength=count) == 0)
 
 
 def _mesh_warnings(pairs: Correspondence) -> Iterator[str]:

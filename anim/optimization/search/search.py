@@ -194,6 +194,8 @@ class _Search:
 
     def _random_trials(self, count: int) -> None:
         """Try random changes of some budgets, smaller after failures; the seed is fixed."""
+        if not count:
+            return  # numpy's random numbers are not imported
         chance = np.random.default_rng(SEED)
         spread = LOG_DEVIATIONS[0]
         for _ in range(count):
