@@ -61,7 +61,6 @@ class TrialRunner:
         self._constants = _constant_errors(source, shared)
         self._layouts = TimeAxisSearch(source, coding, self._bound)
         self._candidates = Candidates(source, coding.packing)
-        self._compensation = ParentCompensation(skeleton, source, self._candidates)
 
     def run(self, plan: Plan, *, smaller_than: float = math.inf) -> TrialResult:
         """Return the result of a plan.
@@ -99,6 +98,10 @@ class TrialRunner:
     def leeway(self) -> Floats:
         """Ratio of each track's moment arm to the compensated one (G,)."""
         return budget_gain(self._skeleton, self.source, self.source.points)
+
+    @cached_property
+    def _compensation(self) -> ParentCompensation:
+        return ParentCompensation(self._skeleton, self.source, self._candidates)
 
     def _key_candidates(
         self, aim: RotationTarget, axes: Sequence[SharedAxis], tolerances: Sequence[float], rotation: Floats
