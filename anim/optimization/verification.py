@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import ErrorMetric, MotionError, dense_times, key_and_mid_times
+import numpy as np
+
+from anim.arrays import Floats, unique_sorted
+from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
+from anim.measure.error.metric import SAME_MOMENT, ErrorMetric, MotionError, cut_times, dense_times, key_and_mid_times
 from anim.measure.error.statistics import Statistics, statistics
-from anim.model import Clip
+from anim.model import Clip, Interpolation
 from anim.optimization.options import PLAYERS, Bounds, Reference
 from anim.optimization.tracks.clip_ends import opened_tracks
 
 FLOAT_NOISE = 1e-9  # of the diagonal: rounding in float64 of equal motion
+MAX_SPARSE_STEP_S = 1 / 20  # s; a proof of longer intervals needs more samples than it saves
+SPARSE_SLACK = 0.004  # of the largest distance: so much less than at dense times can be reported
+CUBIC_PARTS = 4  # samples per segment of splines, which can be equal at keys and half-way, and different elsewhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,36 +53,82 @@ def verify(
     detailed: bool = True,
     prover: Prover | None = None,
 ) -> Verification:
-    """Return the errors of `after`, as read from the written file, against `before`.
+    """Return the errors of `after` against `before`.
 
-    Measured at all keys of both, the middles between them, and 120 frames per second; with Reference.KEYS at the
-    source's keys only. players: names in `anim.sampling.players.PLAYERS`; each plays both versions. detailed:
-    statistics too, even if no bound requires them. prover: of the same metric; samples further times to prove a bound
-    for all times, unless the bound is exceeded anyway.
+    `after` is as read from the written file. With a proof, samples are at all keys of both, and elsewhere where the
+    error could be larger; without one at all keys, the middles between them, and 120 frames per second; with
+    Reference.KEYS at the source's keys only. players: names in `anim.sampling.players.PLAYERS`; each plays both
+    versions. detailed: statistics too, even if no bound requires them. prover: of the same metric, for all times.
     """
-    if reference is Reference.KEYS:
-        times, prover = key_and_mid_times(before)[::2], None
-    else:
-        times = dense_times(before, after)
-    look = ruler.sample_errors(before, after, times, players=players)
-    error, player, certified = look.error, look.player, None
-    if prover is not None and error.max_error <= max(bounds.max_error, FLOAT_NOISE * (ruler.diagonal or 1.0)):
-        proof = prover.certified(before, after, times, look, enough=bounds.max_error)
-        error, player, certified = proof.error, proof.player, proof.bound
+    found = _largest_error(ruler, before, after, bounds, reference, players, prover)
+    error = found.error
     wanted = detailed or bounds.max_angle is not None or bounds.max_speed_error is not None
-    found = statistics(ruler, before, after, times=times, player=players[0]) if wanted else None
+    times = _source_keys if reference is Reference.KEYS else dense_times
+    more = statistics(ruler, before, after, times=times(before, after), player=players[0]) if wanted else None
     least = FLOAT_NOISE * (ruler.diagonal or 1.0)
     fractions = [
         _fraction(error.max_error, bounds.max_error, least),
         _fraction(error.max_pointer_error, bounds.max_pointer_error, FLOAT_NOISE),
     ]
-    if bounds.max_angle is not None and found is not None:
-        fractions.append(_fraction(found.angle.size, bounds.max_angle, FLOAT_NOISE))
-    if bounds.max_speed_error is not None and found is not None:
-        fractions.append(_fraction(found.speed.size, bounds.max_speed_error, least))
+    if bounds.max_angle is not None and more is not None:
+        fractions.append(_fraction(more.angle.size, bounds.max_angle, FLOAT_NOISE))
+    if bounds.max_speed_error is not None and more is not None:
+        fractions.append(_fraction(more.speed.size, bounds.max_speed_error, least))
     if (before.start, before.end) != (after.start, after.end) or opened_tracks(before, after):
         fractions.append(float("inf"))
-    return Verification(error, player, found, max(fractions), certified)
+    return Verification(error, found.player, more, max(fractions), found.bound)
+
+
+def _largest_error(
+    ruler: ErrorMetric,
+    before: Clip,
+    after: Clip,
+    bounds: Bounds,
+    reference: Reference,
+    players: Sequence[str],
+    prover: Prover | None,
+) -> Proof:
+    """The largest error in any of the players, and an upper bound of it if the samples are within the bound."""
+    if reference is Reference.KEYS:
+        look = ruler.sample_errors(before, after, _source_keys(before, after), players=players)
+        return Proof(None, look.error, look.player)
+    if prover is not None and all(track.node is not None for track in (*before.tracks, *after.tracks)):
+        found = _proven(ruler, before, after, sparse_times(before, after), bounds, players, prover, SPARSE_SLACK)
+        if found.bound is not None and found.bound <= bounds.max_error:
+            return found  # at all times, so at the dense ones too
+    return _proven(ruler, before, after, dense_times(before, after), bounds, players, prover)
+
+
+def _proven(
+    ruler: ErrorMetric,
+    before: Clip,
+    after: Clip,
+    times: Floats,
+    bounds: Bounds,
+    players: Sequence[str],
+    prover: Prover | None,
+    slack: float = BOUND_SLACK,
+) -> Proof:
+    """The largest error at `times` and at those of a proof, which is tried only if the samples are within the bound."""
+    look = ruler.sample_errors(before, after, times, players=players)
+    if prover is None or look.error.max_error > max(bounds.max_error, FLOAT_NOISE * (ruler.diagonal or 1.0)):
+        return Proof(None, look.error, look.player)
+    return prover.certified(before, after, times, look, enough=bounds.max_error, slack=slack)
+
+
+def sparse_times(*clips: Clip) -> Floats:
+    """Return the key times of clips, few times between, and one before the first key: enough for most proofs.
+
+    In seconds, increasing.
+    """
+    is_cubic = any(track.interpolation is Interpolation.CUBICSPLINE for clip in clips for track in clip.tracks)
+    times = cut_times(*clips, parts=CUBIC_PARTS if is_cubic else 1, step=MAX_SPARSE_STEP_S)
+    return unique_sorted(np.append(times, max(times[0] - SAME_MOMENT, 0.0)))
+
+
+def _source_keys(before: Clip, after: Clip) -> Floats:
+    del after
+    return key_and_mid_times(before)[::2]
 
 
 def _fraction(size: float, bound: float, least: float) -> float:

@@ -67,14 +67,15 @@ class Prover:
         enough: float | None = None,
         floor: float = 0.0,
         longest: float = MAX_UNSPLIT_S,
+        slack: float = BOUND_SLACK,
     ) -> Proof:
         """Return an upper bound of the displacement of any vertex at any time, in all of the players.
 
-        It is at most 1 % above the largest sample, unless intervals between times would need too many subdivisions.
+        It is above the largest sample by at most `slack`, as a fraction of it, unless intervals between times would
+        need too many subdivisions.
         times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
-        `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is less
-        than 1 % above the largest sample. floor: m, bounds below it are not refined. longest: s, as for
-        `interval_rise`.
+        `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
+        largest sample. floor: m, bounds below it are not refined. longest: s, as for `interval_rise`.
         Nothing is proven for scenes with different hierarchies, for players other than those of PLAYERS, or if
         quaternions pass through zero or rotate too far between two times.
         """
@@ -82,7 +83,7 @@ class Prover:
         if not self._knows_all or not set(look.limits) <= set(PLAYERS):
             return Proof(None, worst, player)
         bound = max(worst.max_error, floor)
-        room = max(bound * BOUND_SLACK, NOISE * self.ruler.diagonal)
+        room = max(bound * slack, NOISE * self.ruler.diagonal)
         aim = ProofTarget(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
         seen = RefinedMaximum()
         for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(look.limits))):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +128,7 @@ class ErrorMetric:
                 self.num_static_points = points[..., 0].size - sum(len(g) for each in shells for g in each.groups)
             self.parts += [*groups, *shells]
         self.combined = combine_groups(self.parts)
+        self._last: tuple[Clip, Clip, tuple[PoseSampler, PoseSampler]] | None = None
 
     def _reduce(self, clips: Iterable[Clip], surfaces: Sequence[Surface]) -> ReducedSkeleton | None:
         """The skeletons without static nodes, None where that is not possible or not worth it."""
@@ -214,8 +216,7 @@ class ErrorMetric:
         """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""
         pairs = [parse_pair(player) for player in players]
         samplers = [
-            (PoseSampler(skeleton, clip), [sampler(pair[i]) for pair in pairs])
-            for i, (skeleton, clip) in enumerate(zip(self.skeletons, self.clips(before, after), strict=True))
+            (poses, [sampler(pair[i]) for pair in pairs]) for i, poses in enumerate(self._pose_samplers(before, after))
         ]
         length = max(self.length // len(players), 1)
         for start in range(0, max(len(times), 1), length):
@@ -254,8 +255,16 @@ class ErrorMetric:
 
         asked: names in PLAYERS, each with its times; not more times than `length` in total.
         """
-        old, new = self.clips(before, after)
+        old, new = self._pose_samplers(before, after)
         return _posed(self.skeletons[0], old, asked), _posed(self.skeletons[1], new, asked)
+
+    def _pose_samplers(self, before: Clip, after: Clip) -> tuple[PoseSampler, PoseSampler]:
+        """The samplers of both clips, those of the last call if the clips are the same: their keys are stacked."""
+        if self._last is not None and self._last[0] is before and self._last[1] is after:
+            return self._last[2]
+        old, new = starmap(PoseSampler, zip(self.skeletons, self.clips(before, after), strict=True))
+        self._last = before, after, (old, new)
+        return old, new
 
     def called(self, node: int) -> str:
         """Return the name of a node of `skeletons` for reports: its own, or "node 7"; "" for −1."""
@@ -264,20 +273,16 @@ class ErrorMetric:
         return self.scene.skeleton.display_name(node) if node >= 0 else ""
 
 
-def _posed(skeleton: Skeleton, clip: Clip, asked: Sequence[tuple[str, Floats]]) -> PosedSkeleton:
-    poses = PoseSampler(skeleton, clip)
-    each = [poses.sampled(sampler(player)).at(times) for player, times in asked]
-    weights = {node: np.concatenate([one.weights[node] for one in each]) for node in each[0].weights}
-    return PosedSkeleton(
-        skeleton,
-        Pose(
-            np.concatenate([one.times for one in each]),
-            np.concatenate([one.translation for one in each]),
-            np.concatenate([one.rotation for one in each]),
-            np.concatenate([one.scale for one in each]),
-            weights,
-        ),
-    )
+def _posed(skeleton: Skeleton, poses: PoseSampler, asked: Sequence[tuple[str, Floats]]) -> PosedSkeleton:
+    """The clip at all of the times by every player, from which those asked for are taken: mostly nearly all."""
+    at = unique_sorted(np.concatenate([times for _, times in asked]))
+    found = poses.at_each(at, [sampler(player) for player, _ in asked])
+    frames = np.concatenate([i * len(at) + np.searchsorted(at, times) for i, (_, times) in enumerate(asked)])
+    if len(frames) == len(found.times):
+        return PosedSkeleton(skeleton, found)
+    weights = {node: each[frames] for node, each in found.weights.items()}
+    parts = found.translation[frames], found.rotation[frames], found.scale[frames]
+    return PosedSkeleton(skeleton, Pose(found.times[frames], *parts, weights))
 
 
 def _round_up(values: Floats) -> NDArray[np.float32]:

@@ -107,6 +107,21 @@ def test_a_bound_for_every_time() -> None:
     assert proven.error.max_error <= proven.certified <= 1.01 * proven.error.max_error
 
 
+def test_a_proof_needs_few_samples() -> None:
+    """At 24 keys per second, 120 frames per second and the middles are six times as many; the result is the same."""
+    times = np.arange(49) / 24
+    before = clip(track("rotation", times, about("z", 40 * np.sin(3 * times))))
+    after = clip(track("rotation", times[::4], about("z", 40 * np.sin(3 * times[::4]))))
+    plain, proven = (
+        verify(RULER, before, after, bounds=Bounds(0.05, 0.0), reference=Reference.CURVE, prover=prover)
+        for prover in (None, Prover(RULER))
+    )
+    assert proven.certified is not None
+    assert 4 * proven.error.times < plain.error.times
+    assert proven.error.max_error == pytest.approx(plain.error.max_error, rel=0.005)
+    assert plain.error.max_error <= proven.certified
+
+
 def test_nothing_is_proven_where_the_bound_is_broken_or_only_keys_count() -> None:
     prover = Prover(RULER)
     for bound, reference in ((0.001, Reference.CURVE), (1.0, Reference.KEYS)):
