@@ -45,8 +45,9 @@ class FrictionHooks:
     more than MAX_HOOKED such colliders at once, the others have a friction between both for this sample.
     """
 
-    def __init__(self, materials: Sequence[Material], step: float) -> None:
-        """materials: of all colliders. step: s."""
+    def __init__(self, materials: Sequence[Material], step: float, units: float = 1.0) -> None:
+        """materials: of all colliders. step: s. units: length units of the world per metre."""
+        self._max_sticking_speed = units * MAX_STICKING_SPEED_M_S
         self._pairs = MaterialPairs(materials)
         self.are_needed = self._pairs.need_hooks
         package = load_package()
@@ -72,7 +73,7 @@ class FrictionHooks:
         if not self._pairs.has_static:
             return
         if self._step == 0 or self._step % self._interval == 1 % self._interval:  # the first step has no contacts yet
-            slow = reader.find_slow(MAX_STICKING_SPEED_M_S / 2)
+            slow = reader.find_slow(self._max_sticking_speed / 2)
             self._choose(slow, reader.find_slips(slow))
         self._step += 1
 
@@ -81,7 +82,8 @@ class FrictionHooks:
 
         slow: bodies whose contacts with each other stick. slips: velocities of all other contacts.
         """
-        self._slides = {pair: _slides_on(self._slips.get(pair), slip) for pair, slip in slips.items()}
+        most = self._max_sticking_speed
+        self._slides = {pair: _slides_on(self._slips.get(pair), slip, most) for pair, slip in slips.items()}
         self._slips = slips
         sticking = {index for pair, slides in self._slides.items() if not slides for index in pair}
         are_slow = slow.tolist()
@@ -124,19 +126,19 @@ class FrictionHooks:
         pair = context.collider1.index, context.collider2.index
         slides = self._slides.get(pair)
         if slides is None:
-            slides = self._slides[pair] = self._pairs.has_static and _slides(context)
+            slides = self._slides[pair] = self._pairs.has_static and _slides(context, self._max_sticking_speed)
         materials = self._colliders[pair[0]].material, self._colliders[pair[1]].material
         context.friction, context.restitution = self._pairs.coefficients(materials, slides)
 
 
-def _slides_on(before: Velocity | None, now: Velocity) -> bool:
+def _slides_on(before: Velocity | None, now: Velocity, most: float) -> bool:
     """Return True for a contact that slides at two samples; with opposed velocities it has stopped in between."""
     has_turned = before is not None and sum(a * b for a, b in zip(before, now, strict=True)) < 0
-    return not has_turned and math.hypot(*now) > MAX_STICKING_SPEED_M_S
+    return not has_turned and math.hypot(*now) > most
 
 
-def _slides(context: Any) -> bool:
-    """True if a contact point of a pair moves along the surface; plain numbers, for speed."""
+def _slides(context: Any, most: float) -> bool:
+    """True if a contact point of a pair is faster than `most` along the surface; plain numbers, for speed."""
     handles = [each for each in (context.rigid_body1, context.rigid_body2) if each is not None]
     bodies = [body for body in (context.bodies[each] for each in handles) if not body.is_fixed]
     nx, ny, nz = context.normal.to_tuple()
@@ -147,6 +149,6 @@ def _slides(context: Any) -> bool:
             vx, vy, vz = body.velocity_at_point(point).to_tuple()
             x, y, z = x + sign * vx, y + sign * vy, z + sign * vz
         along = x * nx + y * ny + z * nz
-        if x * x + y * y + z * z - along * along > MAX_STICKING_SPEED_M_S**2:
+        if x * x + y * y + z * z - along * along > most * most:
             return True
     return False

@@ -1,5 +1,7 @@
 """Engine Rapier: scenes become its world, centered, in float32. This module is the interface of the package.
 
+Small scenes are enlarged in it, see `length_unit`; all that goes in and comes out is in metres.
+
 Rapier solves each step in SUBSTEPS substeps of symplectic Euler, which moves a free fall ½·g·t·h/SUBSTEPS ahead of
 its parabola. All velocities begin half a substep earlier, as in leapfrog; then a free flight is exact.
 """
@@ -17,6 +19,7 @@ from anim.simulation.rigid_bodies.rapier.filters import interaction_groups
 from anim.simulation.rigid_bodies.rapier.frames import isometry, shape_frame
 from anim.simulation.rigid_bodies.rapier.friction import FrictionHooks
 from anim.simulation.rigid_bodies.rapier.joints import build_joint, find_approximations
+from anim.simulation.rigid_bodies.rapier.length_unit import choose_unit, scale_scene
 from anim.simulation.rigid_bodies.rapier.package import load_package
 from anim.simulation.rigid_bodies.rapier.shapes import INFINITE_MASS_KG, PLANE_REACH_M, ShapeBuilder
 from anim.simulation.rigid_bodies.rapier.slip import SlipReader
@@ -35,7 +38,8 @@ class RapierWorld:
 
     def __init__(self, scene: RigidScene, step: float) -> None:
         self._rapier = load_package()
-        self._scene = scene
+        self._units = choose_unit(scene)
+        self._scene = scene = scale_scene(scene, self._units)
         self._center = _center(scene)
         world = self._rapier.PhysicsWorld(gravity=scene.gravity)
         self._world = world
@@ -44,11 +48,12 @@ class RapierWorld:
         parameters.normalized_contact_recycle_distance = MAX_RECYCLED_M
         parameters.contact_softness = parameters.static_contact_softness  # bodies sink half as deep into each other
         parameters.normalized_allowed_linear_error = _allowed_penetration(scene)
-        parameters.normalized_max_linear_velocity = MAX_SPEED_M_S  # its own is 400 m/s
+        parameters.normalized_max_linear_velocity = self._units * MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
         self._groups = interaction_groups(scene)
         self._shapes = ShapeBuilder(scene, self._center)
-        self._friction = FrictionHooks([each.material for body in scene.bodies for each in body.colliders], step)
+        materials = [each.material for body in scene.bodies for each in body.colliders]
+        self._friction = FrictionHooks(materials, step, self._units)
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
@@ -70,16 +75,21 @@ class RapierWorld:
 
     def move(self, index: int, position: Floats, rotation: Floats) -> None:
         """Move an animated body to a frame by the end of the next step."""
-        self._bodies[index].set_next_kinematic_position(isometry(Frame(position - self._center, rotation)))
+        self._bodies[index].set_next_kinematic_position(
+            isometry(Frame(self._units * position - self._center, rotation))
+        )
 
     def states(self) -> list[tuple[float, ...]]:
         """Return position and quaternion xyzw of the moving bodies: 7 numbers each, relative to `center`."""
-        return [(*body.translation.to_tuple(), *body.rotation.to_tuple()) for body in self._read]
+        states = [(*body.translation.to_tuple(), *body.rotation.to_tuple()) for body in self._read]
+        if self._units == 1.0:  # nearly always, and read in every step
+            return states
+        return [(x / self._units, y / self._units, z / self._units, *rotation) for x, y, z, *rotation in states]
 
     @property
     def center(self) -> Floats:
-        """Origin (3,) of the world's own coordinates, near the bodies: float32 is finest there."""
-        return self._center
+        """Origin (3,) m of the states, near the bodies: float32 is finest there."""
+        return self._center / self._units
 
     def energy(self) -> tuple[float, float]:
         """Return kinetic and potential energy of the dynamic bodies, in joules; after the first step."""
@@ -91,7 +101,7 @@ class RapierWorld:
             kinetic += body.kinetic_energy()
             px, py, pz = body.center_of_mass.to_tuple()
             potential -= mass * (x * px + y * py + z * pz)
-        return kinetic, potential
+        return kinetic / self._units**2, potential / self._units**2
 
     def _finite(self) -> list[tuple[Any, float]]:
         """Dynamic bodies of finite mass, with their gravity factor."""
@@ -112,12 +122,13 @@ class RapierWorld:
             if depths:
                 ends = (self._colliders[handle.index][0] for handle in (pair.collider1, pair.collider2))
                 first, second = sorted(ends)
-                found.append((first, second, max(depths)))
+                found.append((first, second, max(depths) / self._units))
         return found
 
     def centers_of_mass(self) -> Floats:
         """Return the centers of mass (M, 3) of the moving bodies in their own frames; after the first step."""
-        return np.array([body.local_center_of_mass.to_tuple() for body in self._read]).reshape(-1, 3)
+        centers = [body.local_center_of_mass.to_tuple() for body in self._read]
+        return np.array(centers).reshape(-1, 3) / self._units
 
     def impulses(self, index: int) -> list[tuple[int, float, Floats, Floats]]:
         """Return the contacts that pushed a body in the last step, the strongest of each pair of colliders.
@@ -137,7 +148,7 @@ class RapierWorld:
                     point, manifold = max(contacts, key=lambda each: (each[0].impulse, -each[0].dist))
                     normal = (1.0 if is_second else -1.0) * np.array(manifold.data.normal.to_tuple())
                     at = self._contact_point(handle, manifold, is_second)
-                    found.append((other, float(point.dist), normal, at))
+                    found.append((other, float(point.dist) / self._units, normal, at / self._units))
         return found
 
     def _contact_point(self, handle: Any, manifold: Any, is_second: bool) -> Floats:

@@ -1,0 +1,111 @@
+"""Length units of Rapier's world: small scenes are enlarged, since its hulls pass through each other at centimetres.
+
+Its distances of hulls have tolerances in metres that no parameter changes. Time and mass stay, so velocities and
+accelerations are scaled as lengths are, and energies and torques by the square.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from anim.simulation.rigid_bodies.description import JointDrive, JointLimit, Motion, Vector
+from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, Frame, RigidBody, RigidJoint, RigidScene
+from anim.simulation.rigid_bodies.shapes import scale_shape
+
+MIN_RADIUS_M = 0.0625  # of the smallest moving body, below which a scene is enlarged; hulls fail at a third of it
+ENLARGED_RADIUS_UNITS = 0.25  # at least, of that body then
+MAX_UNITS_PER_METRE = 1024.0
+
+
+def choose_unit(scene: RigidScene) -> float:
+    """Return length units per metre: 1, or for small moving bodies the power of two that makes them large enough."""
+    radii = [scene.bodies[i].radius for i in scene.moving if scene.bodies[i].radius > 0]
+    least = min(radii, default=1.0)
+    if least >= MIN_RADIUS_M:
+        return 1.0
+    return min(2.0 ** math.ceil(math.log2(ENLARGED_RADIUS_UNITS / least)), MAX_UNITS_PER_METRE)
+
+
+def scale_scene(scene: RigidScene, units: float) -> RigidScene:
+    """Return a scene with `units` length units per metre."""
+    if units == 1.0:
+        return scene
+    return RigidScene(
+        tuple(_scale_body(each, units) for each in scene.bodies),
+        tuple(_scale_joint(each, units) for each in scene.joints),
+        _scale(scene.gravity, units),
+    )
+
+
+def _scale_body(body: RigidBody, units: float) -> RigidBody:
+    return replace(
+        body,
+        frame=_scale_frame(body.frame, units),
+        colliders=tuple(_scale_collider(each, units) for each in body.colliders),
+        motion=_scale_motion(body.motion, units),
+        linear_velocity=units * body.linear_velocity,
+        radius=units * body.radius,
+    )
+
+
+def _scale_collider(collider: BodyCollider, units: float) -> BodyCollider:
+    shape = scale_shape(collider.shape, units * np.eye(3))
+    return replace(collider, shape=shape, frame=_scale_frame(collider.frame, units))
+
+
+def _scale_motion(motion: Motion, units: float) -> Motion:
+    center, inertia = motion.center_of_mass, motion.inertia_diagonal
+    return replace(
+        motion,
+        density=motion.density / units**3,
+        center_of_mass=None if center is None else _scale(center, units),
+        inertia_diagonal=None if inertia is None else _scale(inertia, units**2),
+        linear_velocity=(0.0, 0.0, 0.0),  # the body has it, in the scene's space
+    )
+
+
+def _scale_joint(joint: RigidJoint, units: float) -> RigidJoint:
+    first, second = (_scale_frame(each, units) for each in joint.frames)
+    return replace(
+        joint,
+        frames=(first, second),
+        limits=tuple(_scale_limit(each, units) for each in joint.limits),
+        drives=tuple(_scale_drive(each, units) for each in joint.drives),
+    )
+
+
+def _scale_limit(limit: JointLimit, units: float) -> JointLimit:
+    if not limit.angular:
+        return replace(limit, min=units * limit.min, max=units * limit.max)
+    stiffness = None if limit.stiffness is None else units**2 * limit.stiffness
+    return replace(limit, stiffness=stiffness, damping=units**2 * limit.damping)
+
+
+def _scale_drive(drive: JointDrive, units: float) -> JointDrive:
+    """A drive's numbers: stiffness in N/m stays, that in N·m/rad doesn't, unless it gives an acceleration."""
+    if not drive.angular:
+        return replace(
+            drive,
+            max_force=units * drive.max_force,
+            position_target=units * drive.position_target,
+            velocity_target=units * drive.velocity_target,
+        )
+    factor = 1.0 if drive.acceleration else units**2
+    return replace(
+        drive,
+        max_force=units**2 * drive.max_force,
+        stiffness=factor * drive.stiffness,
+        damping=factor * drive.damping,
+    )
+
+
+def _scale_frame(frame: Frame, units: float) -> Frame:
+    return replace(frame, position=units * frame.position)
+
+
+def _scale(vector: Vector, factor: float) -> Vector:
+    x, y, z = vector
+    return (factor * x, factor * y, factor * z)
