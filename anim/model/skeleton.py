@@ -95,6 +95,15 @@ def nearest_ancestor(parents: Sequence[int] | Ints, node: int, among: Container[
     return next((above for above in ancestors(parents, node) if above in among), -1)
 
 
+def nearest_ancestors(skeleton: Skeleton, among: Container[int]) -> list[int]:
+    """Return for every node the nearest one above it that is in `among`, −1 for none; in one pass for all."""
+    found = [-1] * len(skeleton)
+    for level in skeleton.levels()[1:]:
+        for node, parent in zip(level.tolist(), skeleton.parents[level].tolist(), strict=True):
+            found[node] = parent if parent in among else found[parent]
+    return found
+
+
 def _find_levels(parents: Ints) -> tuple[Ints, ...]:
     """The nodes of each depth; raises FormatError for a cycle or a parent that does not exist."""
     if len(parents) and (parents.min() < -1 or parents.max() >= len(parents)):

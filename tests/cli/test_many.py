@@ -10,18 +10,23 @@ import json
 import sys
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import numpy as np
 import pytest
 
+from anim.arrays import Floats, Ints
+from anim.maths import hierarchy
 from anim.measure.continuous_bound.prover import Prover
+from anim.measure.error.metric import ErrorMetric
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
 from fixtures.broken.pieces import buffered, text
+from tests import many
 from tests.cli.conftest import Call
 from tests.cli.running import refusal
-from tests.files import clips_of
+from tests.files import clips_of, opened_path
 
 NODES = 2000, 6000
 LIMIT = 5.0  # three times the nodes take three times the work, nine times if quadratic
@@ -189,3 +194,55 @@ def test_curves_whose_children_come_before_their_parents(call: Call, tmp_path: P
         (tmp_path / "a.json").write_text(json.dumps({**about, "nodes": nodes[::-1]}))
         taken.append(work(call, "from-euler", tmp_path / "a.json", tmp_path / "out.glb"))
     assert taken[1] < LIMIT * taken[0]
+
+
+def test_a_deep_chain_of_moving_nodes_is_not_refined(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bounds of derivatives grow with the depth's square: samples between the frames would only take time."""
+    counted = _count_calls(monkeypatch, ErrorMetric, "posed")
+    paths = []
+    for count in (20, 300):
+        (tmp_path / f"{count}.glb").write_bytes(many.chain_open(count))
+        done = call("resample", tmp_path / f"{count}.glb", tmp_path / "out.glb", "--fps", "5")
+        done.product()
+        paths.append((len(counted), "max at least" in done.err))
+        counted.clear()
+    assert paths[0][0] > 0
+    assert paths[1] == (0, True)
+
+
+def test_a_bvh_of_a_long_chain_is_as_long_as_the_chain(call: Call, tmp_path: Path) -> None:
+    """Not as its square, by tabs; and it is read again."""
+    sizes = []
+    for count in (300, 600):
+        (tmp_path / "in.glb").write_bytes(many.chain_open(count))
+        call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh").product()
+        sizes.append(len((tmp_path / "out.bvh").read_bytes()))
+    assert sizes[1] < 2.1 * sizes[0]
+    call("from-euler", tmp_path / "out.bvh", tmp_path / "again.glb").product()
+    assert len(opened_path(tmp_path / "again.glb").json["nodes"]) == 601  # with its end site
+
+
+def test_static_nodes_are_measured_as_one(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 3000 nodes one moves: world matrices are those of a few nodes, in every frame."""
+    sizes: list[int] = []
+
+    def called(local: Floats, parents: Ints, *more: Any) -> Floats:
+        sizes.append(local.size // 12)
+        return accumulate(local, parents, *more)
+
+    accumulate = hierarchy.accumulate
+    monkeypatch.setattr(hierarchy, "accumulate", called)
+    for make in (many.chain, many.side_meshes):
+        sizes.clear()
+        (tmp_path / "in.glb").write_bytes(make(3000))
+        call("diff", tmp_path / "in.glb", tmp_path / "in.glb").product()
+        assert max(sizes) <= 3000
+        assert sum(sizes) < 20 * 3000
+
+
+def test_skins_are_reported_by_their_own_meshes(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "in.glb").write_bytes(many.skins(3))
+    report = call("inspect", tmp_path / "in.glb", "--format", "json").json["files"][0]
+    assert [(each["joints"], each["vertices"]) for each in report["skins"]] == [(2, 3)] * 3

@@ -18,7 +18,7 @@ from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Clip, Skeleton, TimeAxis
-from anim.model.skeleton import ancestors, nearest_ancestor
+from anim.model.skeleton import ancestors, nearest_ancestors
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.world import world_rotations
 from anim.units import format_number
@@ -79,6 +79,8 @@ class _Skeleton:
         moving, still = sample_pose(skeleton, clip, times), rest_pose(skeleton)
         self.skeleton, self.clip = skeleton, clip
         self.numbers = {node: i for i, node in enumerate(chosen)}
+        self.above = nearest_ancestors(skeleton, self.numbers)
+        self.ends = _ends(skeleton, clip, self.numbers)
         self._places, self._home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
         turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
         self._turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
@@ -95,10 +97,10 @@ def _node(
     figure: _Skeleton, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
 ) -> EulerNode:
     """A joint with its required curves; lengths in the file's unit, keys at times `shown`."""
-    parent = nearest_ancestor(figure.skeleton.parents, node, figure.numbers)
+    parent = figure.above[node]
     offset, turn, path = _relative_to(figure.placed(node), figure.placed(parent))
     moved = parent < 0 or bool(np.abs(path - offset).max() > CONSTANT_TOLERANCE * figure.size)
-    end = parent >= 0 and not moved and _is_end(figure.skeleton, figure.clip, node, figure.numbers)
+    end = parent >= 0 and not moved and node in figure.ends
     order = orders.of(name, turn)
     angles = euler.unwrap(turn, order=order, frame=AxesConvention.INTRINSIC, lock=LOCK_TOLERANCE_RAD)
     return EulerNode(
@@ -142,19 +144,23 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
 def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
     """Nodes to write, parents first: the joints, the nodes between them, and leaves as end markers."""
     wanted = set(joints) or set(range(len(skeleton)))
-    top = set(wanted)
+    above = nearest_ancestors(skeleton, set(wanted))
     for node in list(wanted):
-        if nearest_ancestor(skeleton.parents, node, top) >= 0:
-            wanted.update(takewhile(lambda above: above not in top, ancestors(skeleton.parents, node)))
-    wanted |= {n for n in range(len(skeleton)) if _is_end(skeleton, clip, n, wanted)}
+        if above[node] >= 0:
+            wanted.update(takewhile(lambda parent: parent not in wanted, ancestors(skeleton.parents, node)))
+    wanted |= _ends(skeleton, clip, wanted)
     return [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
 
 
-def _is_end(skeleton: Skeleton, clip: Clip, node: int, among: Collection[int]) -> bool:
-    parent = int(skeleton.parents[node])
-    leaf = not (skeleton.parents == node).any()
-    named = parent >= 0 and skeleton.names[node].casefold().endswith(END_NAME_SUFFIX)
-    return named and leaf and parent in among and all(track.node != node for track in clip.tracks)
+def _ends(skeleton: Skeleton, clip: Clip, among: Collection[int]) -> set[int]:
+    """Static leaves named as ends of a node in `among`."""
+    parents = skeleton.parents.tolist()
+    others = {*parents, *(track.node for track in clip.tracks)}  # no leaf, or moving
+    return {
+        node
+        for node, name in enumerate(skeleton.names)
+        if name.casefold().endswith(END_NAME_SUFFIX) and node not in others and parents[node] in among
+    }
 
 
 def _names(skeleton: Skeleton) -> list[str]:
@@ -184,7 +190,7 @@ def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int])
     """Descriptions of the tracks that a BVH of the chosen nodes cannot represent."""
     carrying = set(chosen)
     for node in chosen:
-        carrying.update(ancestors(skeleton.parents, node))
+        carrying.update(takewhile(lambda above: above not in carrying, ancestors(skeleton.parents, node)))
     names = labels(skeleton)
     return [
         label_of(track, names)

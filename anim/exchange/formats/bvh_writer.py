@@ -10,6 +10,7 @@ from anim.exchange.euler.curve import evaluate
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths.euler import AxesConvention
 
+MAX_INDENT = 64  # tabs: with one per joint the size of a long chain is quadratic
 DECIMALS = 6  # decimals of degrees and of the file's unit of length
 
 
@@ -39,7 +40,7 @@ def write(motion: EulerMotion) -> bytes:
         lines += _open_joint(node, depth, is_leaf=not below)
         if not node.end:
             columns += _columns(node, times, _has_position(node))
-            waiting.append("\t" * depth + "}")
+            waiting.append("\t" * min(depth, MAX_INDENT) + "}")
             waiting += [(child, depth + 1) for child in reversed(below)]
     step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1 / 30
     lines += ["MOTION", f"Frames: {len(times)}", f"Frame Time: {step:.9f}".rstrip("0")]
@@ -62,7 +63,7 @@ def _frame_times(motion: EulerMotion) -> Floats:
 
 def _open_joint(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
     """The lines of a node before its children; complete for an End Site and for a joint without children."""
-    tab = "\t" * depth
+    tab = "\t" * min(depth, MAX_INDENT)
     offset = f"OFFSET {_format_vector(node.translation)}"
     if node.end:
         return [f"{tab}End Site", f"{tab}{{", f"{tab}\t{offset}", f"{tab}}}"]

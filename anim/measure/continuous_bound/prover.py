@@ -19,7 +19,10 @@ from anim.sampling.players import PLAYERS
 
 BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is not refined
 MAX_PARTS = 128  # maximum number of subintervals between two times
+MAX_REFINED_DEPTH = 256  # levels of moving nodes; the bounds of deeper ones are too loose for any number of samples
 PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # players with normalized arcs are adjacent
+LARGE_SKELETON = 1000  # moving nodes; from here on a step is LARGE_STEP_FRACTION as long, for memory
+LARGE_STEP_FRACTION = 0.125
 BLOCK = 1_000_000  # players × intervals × groups and nodes per step, each about 100 bytes
 
 
@@ -56,6 +59,7 @@ class Prover:
         a, b = ruler.skeletons
         same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
         self._knows_all = same and len(self._parts) == len(found)
+        self._is_refined = len(a.levels()) <= MAX_REFINED_DEPTH
 
     def certified(
         self,
@@ -72,7 +76,7 @@ class Prover:
         """Return an upper bound of the displacement of any vertex at any time, in all of the players.
 
         It is above the largest sample by at most `slack`, as a fraction of it, unless intervals between times would
-        need too many subdivisions.
+        need too many subdivisions, or nodes that move are below hundreds of others.
         times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
         `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
         largest sample. floor: m, bounds below it are not refined. longest: s, as for `interval_rise`.
@@ -103,7 +107,9 @@ class Prover:
     def _length(self, players: int) -> int:
         """Maximum number of intervals per step."""
         groups = sum(len(part.groups) for part in self._parts)
-        return max(BLOCK // (players * (groups + len(self.ruler.skeletons[0])) + 1), 8)
+        nodes = len(self.ruler.skeletons[0])
+        block = int(BLOCK * LARGE_STEP_FRACTION) if nodes >= LARGE_SKELETON else BLOCK
+        return max(block // (players * (groups + nodes) + 1), 8)
 
     def _proven(
         self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget, longest: float
@@ -117,6 +123,7 @@ class Prover:
         for player, each in limits.items():
             tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise
             is_open = tops > aim.found + aim.slack
+            is_open &= self._is_refined
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
                 parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.slack))

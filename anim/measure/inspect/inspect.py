@@ -53,6 +53,7 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
         report = next(measured) if first[n] == n else reports[first[n]]
         reports.append(_with_costs(report, i, clips[i].name, costs[i], packed, contents.file_bytes))
     skins = range(len(json_array(json, "skins")))
+    using = _instances_by_skin(document, scene)
     return Facts(
         str(json["asset"].get("generator", "")),
         tuple(json.get("extensionsUsed", ())),
@@ -63,7 +64,7 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
         stored_bytes,
         cost.json,
         tuple(reports),
-        tuple(_skin(i, document, scene) for i in skins if i not in contents.lost_skins),
+        tuple(_skin(i, document, scene, using.get(i, [])) for i in skins if i not in contents.lost_skins),
         contents.faults,
         contents.unreadable_clips,
     )
@@ -185,11 +186,18 @@ def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> Track
     )
 
 
-def _skin(number: int, document: Document, scene: Scene | None) -> SkinReport:
+def _instances_by_skin(document: Document, scene: Scene | None) -> dict[int, list[MeshInstance]]:
+    nodes = json_array(document.json, "nodes")
+    found: dict[int, list[MeshInstance]] = {}
+    for instance in scene.instances if scene is not None else ():
+        if "skin" in nodes[instance.node]:
+            found.setdefault(nodes[instance.node]["skin"], []).append(instance)
+    return found
+
+
+def _skin(number: int, document: Document, scene: Scene | None, using: Sequence[MeshInstance]) -> SkinReport:
     about = json_array(document.json, "skins")[number]
     name, joints = about.get("name", ""), about["joints"]
-    nodes = json_array(document.json, "nodes")
-    using = [i for i in scene.instances if nodes[i.node].get("skin") == number] if scene is not None else []
     if scene is None or not using:
         return SkinReport(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
     counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
