@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,15 +144,28 @@ def locate(motion: VertexMotion, vertex: int) -> tuple[str, int]:
 
 def _pairs(old: Scene, new: Scene) -> Iterator[tuple[int, int]]:
     """Indices of instances that correspond by node name, else by mesh name, each used once."""
-    free = list(range(len(new.instances)))
+    free: dict[tuple[str, str, int], list[int]] = {}  # the first of a list at its end
+    for k, each in reversed(list(enumerate(new.instances))):
+        count = len(each.mesh.positions)
+        free.setdefault(("node", _name(new, each), count), []).append(k)
+        free.setdefault(("mesh", each.mesh.name, count), []).append(k)
+    used: set[int] = set()
     for i, each in enumerate(old.instances):
-        name = _name(old, each)
-        same = [k for k in free if len(new.instances[k].mesh.positions) == len(each.mesh.positions)]
-        by_node = [k for k in same if _name(new, new.instances[k]) in (name, f"{name}{BAKED_SUFFIX}")]
-        by_mesh = [k for k in same if each.mesh.name and new.instances[k].mesh.name == each.mesh.name]
-        if found := by_node or by_mesh:
-            free.remove(found[0])
-            yield i, found[0]
+        count, name = len(each.mesh.positions), _name(old, each)
+        by_node = _first_free([free.get(("node", one, count), []) for one in (name, f"{name}{BAKED_SUFFIX}")], used)
+        by_mesh = _first_free([free.get(("mesh", each.mesh.name, count), [])], used) if each.mesh.name else None
+        found = by_mesh if by_node is None else by_node
+        if found is not None:
+            used.add(found)
+            yield i, found
+
+
+def _first_free(lists: Sequence[list[int]], used: Container[int]) -> int | None:
+    """The smallest index that is not used, from lists with their smallest at the end; used ones are removed."""
+    for each in lists:
+        while each and each[-1] in used:
+            each.pop()
+    return min((each[-1] for each in lists if each), default=None)
 
 
 def _name(scene: Scene, instance: MeshInstance) -> str:

@@ -111,6 +111,11 @@ class _SceneMatcher:
         self._on_node = {instance.node: instance for instance in self._new}
         old = [instance.mesh.name for instance in scene.instances if len(instance.mesh.positions)]
         self._named = name_matching.match_by_name(old, [instance.mesh.name for instance in self._new]).tolist()
+        self._skins = tuple(dict.fromkeys(each.skin for each in self._new if each.skin is not None))
+        self._num_faces = [sum(len(each.mesh.faces) for each in one.instances) for one in (scene, other)]
+        self._below_node: dict[int, list[MeshInstance]] = {}
+        for each in self._new:
+            self._below_node.setdefault(int(other.skeleton.parents[each.node]), []).append(each)
         self._local = local_by_node(scene.skeleton, rest_pose(scene.skeleton))[:, 0]
 
     def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
@@ -133,8 +138,7 @@ class _SceneMatcher:
     def is_reduced(self, number: int, instance: MeshInstance) -> bool:
         """Return whether an instance lost primitives that are in no other mesh (other tools split meshes)."""
         lost = [is_reduced(instance.mesh, each.mesh) for each in self._choices(number, instance)]
-        faces = [sum(len(each.mesh.faces) for each in scene.instances) for scene in (self._scene, self._other)]
-        return bool(lost) and all(lost) and faces[1] < faces[0]
+        return bool(lost) and all(lost) and self._num_faces[1] < self._num_faces[0]
 
     def lost(self, instances: Sequence[MeshInstance]) -> list[int]:
         """Indices of instances that the other scene lacks, if exactly their vertices are missing there."""
@@ -197,9 +201,7 @@ class _SceneMatcher:
     def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         """Joints of a skinned surface: of the skin that has most of them, the others by their nodes."""
         plain = self.by_nodes(surface)
-        skins = dict.fromkeys(each.skin for each in self._new if each.skin is not None)
-        if partner is not None and partner.skin is not None:
-            skins = {partner.skin: None}
+        skins = self._skins if partner is None or partner.skin is None else (partner.skin,)
         matched = [(new, self._joints(skin, new)) for new in skins]
         if not matched:
             return plain
@@ -237,8 +239,7 @@ class _SceneMatcher:
     def _below(self, instance: MeshInstance) -> MeshInstance | None:
         """The only instance on a child of an instance's partner node: other tools put meshes there."""
         node = int(self.nodes[instance.node])
-        parents = self._other.skeleton.parents
-        children = [each for each in self._new if node >= 0 and parents[each.node] == node]
+        children = self._below_node.get(node, []) if node >= 0 else []
         return children[0] if len(children) == 1 else None
 
 
