@@ -107,11 +107,14 @@ def command(
 
 
 def _write_page(html: str, path: str, inspected: Inspected, reporter: Reporter) -> None:
+    from anim.show.page.page import PageContent
     from cli.io.page_files import open_page_file  # imports all readers of caches and curves
     from cli.io.page_output import write_page
-    from cli.reports.page_panels import report_panels
+    from cli.reports.page_panels import clip_figures, report_panels
 
-    write_page(html, open_page_file(path, reporter), None, reporter, panels=report_panels(inspected))
+    file = open_page_file(path, reporter)
+    content = PageContent(panels=report_panels(inspected, file.document), figures=clip_figures(inspected.facts))
+    write_page(html, file, None, reporter, content=content)
 
 
 def _csv(done: list[Inspected], smooth: list[Smoothness], *, tracks: bool, continuity: bool) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import time
 from typing import Annotated
 
@@ -16,8 +17,10 @@ from cli.io import browser, documents
 from cli.io.page_files import open_page_file
 from cli.io.page_output import check_page
 from cli.options import common
-from cli.text import Reporter, format_bytes, format_duration, format_length
-from cli.workflows.page_comparison import compare_files, worst_view
+from cli.text import Reporter, format_bytes, format_duration
+from cli.workflows.page_comparison import compare_files, describe_worst, worst_view
+
+BUTTONS = {"skeleton": "bones", "wireframe": "wire"}  # words of the page's buttons and key sheet
 
 
 def command(
@@ -77,17 +80,19 @@ def command(
             reporter.warn("no browser came; -o page.html writes the page")
         return
     documents.write_bytes([np.frombuffer(made, np.uint8)], output)
-    worst = max((each.max for each in content.errors.values()), default=0.0)
-    words = f", max {format_length(worst)}" if content.errors else ""
     called = input if output == documents.PIPE else output
-    reporter.info(f"{called}  {format_bytes(len(made))}{words}, {format_duration(time.perf_counter() - began)}")
+    parts = filter(None, (describe_worst(first, content), format_duration(time.perf_counter() - began)))
+    reporter.info(f"{called}  {format_bytes(len(made))}, {', '.join(parts)}")
 
 
 def _shows(show: str | None) -> tuple[str, ...]:
     names = tuple(name.strip() for name in (show or "").split(",") if name.strip())
-    if unknown := [name for name in names if name not in SHOWS]:
-        raise UsageError(f"--show has '{unknown[0]}' (expected some of {', '.join(SHOWS)})")
-    return names
+    known = tuple(BUTTONS.get(name, name) for name in names)
+    if unknown := [name for name in known if name not in SHOWS]:
+        near = difflib.get_close_matches(unknown[0], SHOWS, n=1)
+        help = f"did you mean '{near[0]}'?" if near else ""
+        raise UsageError(f"--show has '{unknown[0]}' (expected some of {', '.join(SHOWS)})", help=help)
+    return known
 
 
 def _view(

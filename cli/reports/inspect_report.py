@@ -128,7 +128,7 @@ def _clips(clips: Sequence[ClipReport]) -> str:
             [
                 clip_name(clip.name, clip.index),
                 format_span(clip.start_s, clip.end_s).removesuffix(" s"),
-                _rate(clip),
+                frame_rate(clip),
                 "/".join(str(clip.tracks.get(path, 0)) for path in PATHS),
                 clip.keys,
                 "+".join(name[0] for name in sorted(clip.interpolations)),
@@ -145,7 +145,8 @@ def _clips(clips: Sequence[ClipReport]) -> str:
     return tables.text(header, rows)
 
 
-def _rate(clip: ClipReport) -> str:
+def frame_rate(clip: ClipReport) -> str:
+    """Return the estimated frame rate, "~" before one that few keys have; "" if there is none."""
     if clip.frame_rate_fps is None or clip.frame_rate_regular is None:
         return ""
     mark = "" if clip.frame_rate_regular >= 0.98 else "~"

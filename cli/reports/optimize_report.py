@@ -170,16 +170,19 @@ def _worst_words(about: OptimizeReport) -> str:
     verdicts = about.found.verdicts
     if not verdicts:
         return "no clip"
-    words = _error_words(max(verdicts.values(), key=lambda each: each.error.max_error), about)
+    number = max(verdicts, key=lambda i: verdicts[i].error.max_error)
+    clip = f" in '{reader.clip_name(about.clips[number].name, number)}'" if len(about.clips) > 1 else ""
+    words = _error_words(verdicts[number], about, clip)
     return words + optimize_bound.summary(verdicts.values(), about.request, about.scale)
 
 
-def _error_words(verdict: Verification, about: OptimizeReport) -> str:
+def _error_words(verdict: Verification, about: OptimizeReport, clip: str = "") -> str:
+    """Largest error of a clip, and its position. clip: " in 'Run'", where the line is about several."""
     error = verdict.error
     if error.max_error <= FLOAT_NOISE * about.scale:
         words = "no vertex moved"
     else:
-        where = f" at '{error.joint}', {error.time:.3f} s" if error.joint else ""
+        where = f"{clip} at '{error.joint}', {error.time:.3f} s" if error.joint else clip
         words = _length(error.max_error, about.scale) + where
     if error.max_pointer_error > 0:
         words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"

@@ -1,37 +1,86 @@
-"""Reports as panels of a page: findings with links, contents, and sizes."""
+"""Reports as panels of a page: findings with links, contents, sizes, and figures of clips."""
 
 from __future__ import annotations
 
 import re
 
 from anim.check.finding import Finding, Severity
-from anim.show.page.page import PageLink, PagePanel, PageRow
-from anim.units import plural
-from cli.reports.inspect_report import Inspected
+from anim.gltf.document import Document
+from anim.measure.inspect.report import ClipReport, Facts, SkinReport
+from anim.show.page.page import ClipFigure, PageLink, PagePanel, PageRow
+from anim.units import format_number, plural
+from cli.reports.inspect_report import MIN_ROOT_DISTANCE_M, PATHS, Inspected, frame_rate
 from cli.reports.optimize_report import OptimizeReport, cost
-from cli.text import format_bytes, format_change
+from cli.text import format_bytes, format_change, format_length, format_speed
 
 _CLIP = re.compile(r"/animations/(\d+)")
 _NODE = re.compile(r"/nodes/(\d+)")
+_SKIN = re.compile(r"/skins/(\d+)")
+HEALTHY = PageRow(("healthy: nothing found",))
 
 
-def report_panels(inspected: Inspected) -> list[PagePanel]:
-    """Return the findings of a file, most severe first, and its contents."""
+def report_panels(inspected: Inspected, document: Document) -> list[PagePanel]:
+    """Return the findings of a file, most severe first, its skins and its contents."""
     order = list(Severity)
     findings = sorted(inspected.findings, key=lambda each: order.index(each.severity))
-    rows = tuple(_finding_row(each) for each in findings) or (PageRow(("none",)),)
+    rows = tuple(_finding_row(each, document) for each in findings) or (HEALTHY,)
     facts = inspected.facts
-    contents = [
-        ("animations", format_bytes(facts.animation_stored_bytes + facts.animation_json_bytes)),
+    skins = tuple(map(_skin_row, facts.skins))
+    return [
+        PagePanel("Findings", rows, str(len(findings) or "")),
+        *([PagePanel("Skins", skins)] if skins else []),
+        PagePanel("Contents", tuple(map(PageRow, _contents(inspected.file_bytes, facts)))),
+    ]
+
+
+def clip_figures(facts: Facts) -> dict[int, list[ClipFigure]]:
+    """Return the columns of `inspect` by clip; cells that are empty there are left out."""
+    return {clip.index: _figures(clip) for clip in facts.clips}
+
+
+def _figures(clip: ClipReport) -> list[ClipFigure]:
+    size = clip.stored_bytes + clip.json_bytes
+    on = "" if clip.seam_measured_on == "skin" else " (nodes)"
+    figures = [ClipFigure("fps", frame_rate(clip), clip.frame_rate_fps or 0.0)] if frame_rate(clip) else []
+    figures += [
+        ClipFigure("keys", str(clip.keys), clip.keys),
+        ClipFigure(f"loop gap{on}", format_length(clip.seam_m), clip.seam_m),
+        ClipFigure("velocity gap", format_speed(clip.seam_speed_m_per_s), clip.seam_speed_m_per_s),
+    ]
+    if clip.root_distance_m > MIN_ROOT_DISTANCE_M:
+        figures.append(ClipFigure("root speed", format_speed(clip.root_speed_m_per_s), clip.root_speed_m_per_s))
+    figures += [ClipFigure(path, plural(n, "track"), n) for path in PATHS if (n := clip.tracks.get(path, 0))]
+    figures += [ClipFigure(name.lower(), plural(n, "track"), n) for name, n in sorted(clip.interpolations.items())]
+    waste = {"constant": clip.constant_tracks, "no-op": clip.no_effect_tracks}
+    figures += [ClipFigure(name, plural(n, "track"), n) for name, n in waste.items() if n]
+    if clip.redundant_keys:
+        figures.append(ClipFigure("redundant", plural(clip.redundant_keys, "key"), clip.redundant_keys))
+    return [*figures, ClipFigure("size", f"{format_bytes(size)}, {format_number(100 * clip.share, 2)} %", size)]
+
+
+def _skin_row(skin: SkinReport) -> PageRow:
+    parts = [plural(skin.joints, "joint")]
+    parts += [f"{skin.unused_joints} unused"] if skin.unused_joints else []
+    parts += [plural(skin.vertices, "vertex").replace("vertexs", "vertices")] if skin.vertices else []
+    if skin.mean_influences is not None:
+        parts.append(f"{skin.mean_influences:.2f} influences on average, {skin.most_influences} at most")
+    parts += [f"{skin.off_sums} weight sums ≠ 1"] if skin.off_sums else []
+    return PageRow((skin.name or f"#{skin.index}",), text=", ".join(parts))
+
+
+def _contents(file_bytes: int, facts: Facts) -> list[tuple[str, str]]:
+    cost = facts.animation_stored_bytes + facts.animation_json_bytes
+    part = f", {100 * cost / file_bytes:.0f} %" if file_bytes else ""
+    return [
+        ("file", format_bytes(file_bytes)),
+        ("animation", format_bytes(cost) + part),
+        ("keys", format_bytes(facts.animation_stored_bytes)),
+        ("JSON of animations", format_bytes(facts.animation_json_bytes)),
         ("nodes", str(facts.nodes)),
         ("meshes", str(facts.meshes)),
         *((("vertices", str(facts.vertices)),) if facts.vertices is not None else ()),
-        *((f"skin {i}", plural(skin.joints, "joint")) for i, skin in enumerate(facts.skins)),
+        *((("extensions", ", ".join(facts.extensions_used)),) if facts.extensions_used else ()),
         *((("made by", facts.generator),) if facts.generator else ()),
-    ]
-    return [
-        PagePanel("Findings", rows, str(len(findings) or "")),
-        PagePanel("Contents", tuple(map(PageRow, contents))),
     ]
 
 
@@ -45,14 +94,17 @@ def size_panels(about: OptimizeReport) -> list[PagePanel]:
     return [PagePanel("Size", rows)]
 
 
-def _finding_row(finding: Finding) -> PageRow:
+def _finding_row(finding: Finding, document: Document) -> PageRow:
     words = f"{finding.where}: {finding.problem}" if finding.where else finding.problem
-    level = finding.severity.value if finding.severity is not Severity.INFO else ""
-    return PageRow((f"{finding.code} {words}",), _link(finding), level)
+    cells = (finding.name, finding.code)
+    return PageRow(cells, _link(finding, document), finding.severity.value, words, finding.advice)
 
 
-def _link(finding: Finding) -> PageLink | None:
-    clip, node = (_index(pattern, finding.pointer) for pattern in (_CLIP, _NODE))
+def _link(finding: Finding, document: Document) -> PageLink | None:
+    """Clip, node and time that a finding is about; for one about a skin, its first joint."""
+    clip, node, skin = (_index(pattern, finding.pointer) for pattern in (_CLIP, _NODE, _SKIN))
+    if skin is not None:
+        node = document.json["skins"][skin]["joints"][0]
     if clip is None and node is None and finding.time_s is None:
         return None
     return PageLink(clip, node, finding.time_s)

@@ -18,6 +18,11 @@ const PIN = `(() => {
   const [x, y] = document.querySelector("#pin").style.transform.match(/-?[\\d.]+/g).map(Number);
   return !spot || Math.hypot(spot.x - x, spot.y - y) < 1;
 })()`;
+// Canvases of curves and scrubber begin and end at the same pixels
+const AXES = `(() => {
+  const [one, other] = ["#curves canvas", "#scrub canvas"].map((each) => document.querySelector(each).getBoundingClientRect());
+  return document.querySelector("footer").checkVisibility() ? one.left === other.left && one.right === other.right : true;
+})()`;
 const NO_ENGINE = 3; // exit code
 const browser = await launch(engine, { library, executable }).catch((error) => leave(error.stack ?? error));
 
@@ -90,6 +95,28 @@ async function tryDesktop(file, faults) {
     await press("p");
     expect((await get("player.state.clip")) === clip, "clip before");
   }
+  const listed = await get(`document.querySelectorAll("[data-clip]").length`);
+  if (await get(`document.querySelector("#list-clips input") !== null`)) {
+    await page.click("#tab-clips");
+    const names = await get("player.sides[0].clipNames");
+    const shown = `[...document.querySelectorAll("[data-clip]")].filter((row) => row.checkVisibility())`;
+    await press("/");
+    await press(names.at(-1)[0]);
+    const wanted = names.filter((name) => name.toLowerCase().includes(names.at(-1)[0].toLowerCase()));
+    expect((await get(`${shown}.length`)) === wanted.length, "the filter leaves the clips with these letters");
+    await press("Enter");
+    expect(wanted.includes(names[await get("player.state.clip")]), "Enter chooses a clip");
+    await press("ArrowDown");
+    expect(await get(`document.activeElement === ${shown}[0]`), "the arrow leads from the filter to the list");
+    await press("ArrowUp");
+    await press("Escape");
+    expect((await get(`${shown}.length`)) === listed, "Escape ends the filter");
+    await press("Escape");
+    await get(`player.update({ sort: "duration" })`);
+    const lengths = await get(`${shown}.map((row) => player.sides[0].clips[row.dataset.clip].duration)`);
+    expect(lengths.every((length, i) => !i || length <= lengths[i - 1]), "clips by duration");
+    await get(`(player.update({ sort: "" }), player.chooseClip(0), true)`);
+  }
   const shows = { s: "bones", w: "wire", o: "onion", c: "clay", g: "curves" };
   for (const [key, name] of Object.entries(shows)) {
     await press(key);
@@ -101,6 +128,12 @@ async function tryDesktop(file, faults) {
     await press(key);
     expect((await get(`player.state.${name}`)) === value, `${key}: ${name}`);
   }
+  await press("g");
+  expect(await get(AXES), "curves and scrubber have one time axis");
+  await page.click("#unit-values");
+  expect((await get("player.state.unit")) === "values", "unit");
+  await page.click("#unit-degrees");
+  await press("g");
   await press("d");
   expect((await get("document.documentElement.dataset.theme")) === "dark", "dark");
   await press("f");
@@ -109,6 +142,7 @@ async function tryDesktop(file, faults) {
   await press("Escape");
   expect(!(await get(`document.querySelectorAll("dialog[open]").length`)), "sheet closes");
   if (await get(`document.querySelectorAll("[data-node]").length`)) {
+    await page.click("#tab-nodes");
     await page.click("[data-node]");
     expect((await get("player.state.node")) !== null, "chooses a node");
     expect(await get("document.activeElement === document.body"), "the space bar plays after a click in a list");
@@ -162,19 +196,31 @@ async function tryPhone(file, faults) {
   await page.click("#menu");
   const clips = await get(`document.querySelectorAll("[data-clip]").length`);
   if (clips) {
+    await page.click("#tab-clips");
     await page.click(`[data-clip="${clips - 1}"]`);
     expect((await get("player.state.clip")) === clips - 1, "taps a clip");
+    expect(await get(`document.querySelector("#clip-name").checkVisibility()`), "names the clip");
+    if (await get(`document.querySelectorAll("[data-node]").length`)) {
+      await page.click("#menu");
+      await page.click("#tab-nodes");
+      await page.click("[data-node]");
+      expect(!(await get(`document.querySelector("#side").checkVisibility()`)), "the list closes behind a node");
+      await page.click("#show-curves");
+    }
     if (await get("player.state.playing")) await page.click("#play");
     expect(!(await get("player.state.playing")), "taps pause");
   } else await page.click("#menu");
   if (!(await get(`player.state.show.has("bones")`))) await page.click("#show-bones");
   expect(await get(`player.state.show.has("bones")`), "taps skeleton");
   await page.click("#menu");
-  const small = await get(`[...document.querySelectorAll("button, select, summary, input")]
-    .filter(each => each.checkVisibility() && each.getBoundingClientRect().height < 44)
-    .map(each => each.id || each.textContent)`);
-  expect(!small.length, `smaller than 44 px: ${small}`);
-  expect(await get("document.documentElement.scrollWidth <= innerWidth"), "scrolls sideways");
+  for (const tab of await get(`[...document.querySelectorAll("[data-tab]")].map((each) => each.id)`)) {
+    await page.click(`#${tab}`);
+    const small = await get(`[...document.querySelectorAll("button, select, input")]
+      .filter(each => each.checkVisibility() && each.getBoundingClientRect().height < 44)
+      .map(each => each.id || each.textContent)`);
+    expect(!small.length, `smaller than 44 px in ${tab}: ${small}`);
+    expect(await get("document.documentElement.scrollWidth <= innerWidth"), `scrolls sideways in ${tab}`);
+  }
   await page.close();
   return page.words;
 }

@@ -98,7 +98,10 @@ def test_two_files_with_errors_over_time(fixture: Fixture, call: Call, tmp_path:
     curve = said["errors"][str(first["clip"])]
     assert max(curve["errors"]) == pytest.approx(worst, rel=1e-3)
     assert first["time"] == pytest.approx(curve["times"][curve["errors"].index(max(curve["errors"]))], abs=1e-3)
-    assert "max " in run.err
+    clip = split(embedded((tmp_path / "ab.html").read_bytes()))[0]["animations"][first["clip"]]["name"]
+    assert f"in '{clip}' at '" in run.err
+    assert f"', {first['time']:.3f} s, took" in run.err
+    assert "diff also measures a small shell" in said["panels"][0]["about"]
 
 
 @needs_page
@@ -201,7 +204,34 @@ def test_reports_as_pages(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     assert said["view"]["t"] == said["panels"][0]["rows"][0]["link"]["time"]
     call("inspect", fixture("biped"), "--html", tmp_path / "i.html").product()
     said = facts((tmp_path / "i.html").read_bytes())
-    assert [each["title"] for each in said["panels"]] == ["Findings", "Contents"]
+    assert [each["title"] for each in said["panels"]] == ["Findings", "Skins", "Contents"]
+
+
+@needs_page
+def test_buttons_name_views_too(call: Call) -> None:
+    page = call("view", "-o", "-", "--show", "skeleton,wireframe", stdin=built("arm")).product()
+    assert facts(page)["view"]["show"] == ["bones", "wire"]
+    assert "did you mean 'curves'?" in call("view", "-o", "-", "--show", "curve", stdin=built("arm")).err
+
+
+@needs_page
+def test_the_page_of_inspect_has_what_its_text_has(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    text = call("inspect", fixture("biped"), "--html", tmp_path / "i.html").product().decode()
+    said = facts((tmp_path / "i.html").read_bytes())
+    report = json.loads(call("inspect", fixture("biped"), "--format", "json").product())["files"][0]
+    assert len(report["clips"]) == len(said["figures"]) > 1
+    for clip in report["clips"]:
+        row = next(line for line in text.splitlines() if line.split()[:1] == [clip["name"]])
+        figures = {each["label"]: each["text"] for each in said["figures"][str(clip["index"])]}
+        assert figures["keys"] == str(clip["keys"])
+        for label in ("fps", "loop gap", "velocity gap"):
+            assert f" {figures[label]}" in row
+    rows = said["panels"][0]["rows"]
+    assert rows
+    assert len(rows) == len(report["findings"])
+    assert {row["advice"] for row in rows} == {each["advice"] for each in report["findings"]}
+    assert {row["cells"][0] for row in rows} == {each["name"] for each in report["findings"]}
+    assert {row["level"] for row in rows} == {each["severity"] for each in report["findings"]}
 
 
 @needs_page
@@ -209,7 +239,7 @@ def test_findings_link_to_their_clip_or_node(call: Call, tmp_path: Path) -> None
     (tmp_path / "a.glb").write_bytes(renamed(built("arm"), ["", "x"]))
     call("inspect", tmp_path / "a.glb", "--html", tmp_path / "i.html").product()
     rows = facts((tmp_path / "i.html").read_bytes())["panels"][0]["rows"]
-    assert [row["link"]["clip"] for row in rows if row["cells"][0].startswith("GA001")] == [0]
+    assert [row["link"]["clip"] for row in rows if row["cells"][1] == "GA001"] == [0]
 
 
 @needs_page

@@ -94,6 +94,7 @@ class ErrorMetric:
     such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
     clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
     num_static_points: number of vertices, or of points of shells if there are none, that no clip moves: in no group.
+    has_shell: whether there are such nodes, measured on a shell.
     """
 
     def __init__(
@@ -115,6 +116,7 @@ class ErrorMetric:
         nodes = np.empty(0, np.int64)
         if shell is not None:
             nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, found) & (self.pairs.nodes >= 0))
+        self.has_shell = len(nodes) > 0
         if self._reduced is None:
             self.parts += [SkinnedGroups(*each) for each in self.pairs.surfaces]
             if shell is not None:

@@ -14,6 +14,7 @@ from anim.measure.compare.name_matching import match_by_name_then_order
 from anim.measure.compare.vertex_distance import VertexDistance
 from anim.measure.error.error_curve import ErrorCurve, error_curve
 from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.surface import has_vertices
 from anim.model import Clip
 from anim.show.page.page import ClipError, PageContent, PageLink, PagePanel, PageRow
 from anim.show.page.paired_meshes import pair_nodes
@@ -23,6 +24,14 @@ MAX_POINTS = 400  # of an error curve on the page
 MAX_CURVES = 100  # clips with an error curve, the worst ones
 CURVE_FPS = 24.0  # of error curves, besides all keys and the middles between them
 MIN_ERROR_PER_DIAGONAL = 1e-7  # smaller errors come from rounding in float32
+VERTICES_MEASURED = (
+    "Distances of vertices. diff also measures a small shell around nodes that move no vertex, and may report more."
+)
+NODES_MEASURED = "Distances of small cubes on the nodes, since A has no vertices."
+SHELL_MEASURED = (
+    "Distances of vertices and, as diff measures them, of a small shell around nodes that move no vertex. "
+    "Heat and ring show vertices only, and may be less."
+)
 UNITS = ((1.0, "m", 1.0), (1e-2, "cm", 1e2), (1e-4, "mm", 1e3), (1e-7, "µm", 1e6), (0.0, "nm", 1e9))
 
 
@@ -64,13 +73,13 @@ def compare_content(
             errors[pair.old] = ClipError(0.0)
         elif i < MAX_CURVES:
             curve = error_curve(ruler, old[pair.old], new[pair.new], player=player, fps=CURVE_FPS)
-            errors[pair.old] = ClipError(pair.error.max_error, *_reduce(*_with_peak(curve, pair.error)))
+            errors[pair.old] = _clip_error(pair.error, *_reduce(*_with_peak(curve, pair.error)))
         else:
-            errors[pair.old] = ClipError(pair.error.max_error)
+            errors[pair.old] = _clip_error(pair.error)
     rows = tuple(_row(ruler, old, pair) for pair in found if pair.error.max_error > least)
     if not rows:
         rows = (PageRow(("no vertex moves differently",)),)
-    panel = PagePanel("Largest errors", rows, hot=len(rows[0].cells) - 1)
+    panel = PagePanel("Largest errors", rows, hot=len(rows[0].cells) - 1, about=_measured(ruler))
     partners = {pair.old: pair.new for pair in found}
     return PageContent(subtitle, (panel,), errors, partners, pair_nodes(ruler.pairs.partners))
 
@@ -86,7 +95,19 @@ def vertex_content(content: PageContent, found: VertexDistance, *, clip: int, la
     cells = (label, f"p99 {_length(found.p99)}", f"{found.time:.3f} s", _length(found.max_error))
     panel = PagePanel("Largest errors", (PageRow(cells, PageLink(clip, None, found.time)),), hot=len(cells) - 1)
     curve = _reduce(np.array(found.times), np.array(found.errors))
-    return replace(content, panels=(*content.panels, panel), errors={clip: ClipError(found.max_error, *curve)})
+    error = ClipError(found.max_error, *curve, time=found.time)
+    return replace(content, panels=(*content.panels, panel), errors={clip: error})
+
+
+def _measured(ruler: ErrorMetric) -> str:
+    """The points that the figures are about, which differ between `diff` and the rest of the page."""
+    if not has_vertices(ruler.scene):
+        return NODES_MEASURED
+    return SHELL_MEASURED if ruler.has_shell else VERTICES_MEASURED
+
+
+def _clip_error(found: MotionError, times: tuple[float, ...] = (), errors: tuple[float, ...] = ()) -> ClipError:
+    return ClipError(found.max_error, times, errors, found.joint, found.time)
 
 
 def _row(ruler: ErrorMetric, old: Sequence[Clip], pair: ClipPair) -> PageRow:

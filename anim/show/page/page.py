@@ -9,7 +9,7 @@ import html
 import json
 import string
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
 from anim.gltf.document import Document
@@ -65,37 +65,55 @@ class PageLink:
 
 @dataclass(frozen=True, slots=True)
 class PageRow:
-    """A row of a panel: its cells, its link, and its level ("error", "warning" or "")."""
+    """A row of a panel: its cells and link; its level: "error", "warning", "info" or ""; text and advice below."""
 
     cells: tuple[str, ...]
     link: PageLink | None = None
     level: str = ""
+    text: str = ""
+    advice: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class PagePanel:
-    """A table beside the picture. hot: index of the column with errors."""
+    """A table beside the picture. hot: index of the column with errors. about: a sentence on all rows."""
 
     title: str
     rows: tuple[PageRow, ...]
     count: str = ""
     hot: int = -1
+    about: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipFigure:
+    """A figure about a clip, as text and as a number to sort clips by."""
+
+    label: str
+    text: str
+    value: float
 
 
 @dataclass(frozen=True, slots=True)
 class ClipError:
-    """Error of one clip over time: its maximum, times in s, and errors in m at these times."""
+    """Error of one clip over time: its maximum, times in s, and errors in m at these times.
+
+    joint, time: position of the maximum, and its time in s; "" and 0 if there is no error.
+    """
 
     max: float
     times: tuple[float, ...] = ()
     errors: tuple[float, ...] = ()
+    joint: str = ""
+    time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PageContent:
     """Contents of a page besides its files.
 
-    errors: by index of a clip of the first file. partners: index of the second file's clip by that of the first.
+    errors, figures: by index of a clip of the first file. partners: indices of the second file's clips by those of
+    the first.
     meshes: nodes of each file whose meshes correspond vertex by vertex, in this order; None: all meshes of a file.
     Without `meshes` the page pairs meshes by name and number of vertices.
     """
@@ -105,6 +123,7 @@ class PageContent:
     errors: Mapping[int, ClipError] = field(default_factory=dict)
     partners: Mapping[int, int] = field(default_factory=dict)
     meshes: tuple[MeshNodes, MeshNodes] | None = None
+    figures: Mapping[int, Sequence[ClipFigure]] = field(default_factory=dict)
 
 
 EMPTY = PageContent()
@@ -178,6 +197,7 @@ def _content(content: PageContent) -> dict[str, Any]:
             i: {"max": each.max, "times": each.times, "errors": each.errors} for i, each in content.errors.items()
         },
         "partners": dict(content.partners),
+        "figures": {i: [asdict(each) for each in figures] for i, figures in content.figures.items()},
         **({} if content.meshes is None else {"meshes": content.meshes}),
     }
 
@@ -187,8 +207,9 @@ def _panel(panel: PagePanel) -> dict[str, Any]:
         {
             "cells": row.cells,
             "level": row.level,
+            **({"text": row.text, "advice": row.advice} if row.text else {}),
             **({"link": {"clip": row.link.clip, "node": row.link.node, "time": row.link.time}} if row.link else {}),
         }
         for row in panel.rows
     ]
-    return {"title": panel.title, "count": panel.count, "hot": panel.hot, "rows": rows}
+    return {"title": panel.title, "count": panel.count, "hot": panel.hot, "about": panel.about, "rows": rows}

@@ -1,8 +1,9 @@
 // What the keys do.
 
+import { nextClip } from "./clips.js";
 import { $ } from "./dom.js";
 import { openSheet } from "./keyboard.js";
-import { scrollToClip } from "./sidebar.js";
+import { focusFilter } from "./sidebar.js";
 import { LOOPS, SIDES, SPEEDS, UNITS, cycle, state, toggleShow, update } from "./state.js";
 
 const STEP_S = 1 / 30;
@@ -47,16 +48,15 @@ export function bindings(player) {
       isShown: isPair,
     },
     { keys: ["b"], label: "both, A, B", run: () => cycle("side", SIDES), isShown: isPair },
+    { keys: ["/"], label: "filter the list, then ↑ ↓", run: focusFilter },
     { keys: ["d"], label: "light or dark", run: () => update({ theme: isDark() ? "light" : "dark" }) },
     { keys: ["?"], label: "this sheet", run: openSheet },
   ];
 }
 
 function chooseNext(player, direction) {
-  const count = player.sides[0].clips.length;
-  if (!count) return;
-  player.chooseClip((state.clip + direction + count) % count);
-  scrollToClip(state.clip);
+  const next = nextClip(state.clip, direction);
+  if (next !== null) player.chooseClip(next);
 }
 
 function changeSpeed(direction) {

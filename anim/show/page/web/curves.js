@@ -1,28 +1,28 @@
 // Curves of the chosen node: as three.js evaluates them, with keys and the tangents of cubic splines.
 
 import { Quaternion } from "three";
+import { roundNumbers, timeAxis } from "./axis.js";
 import { begin, ink } from "./canvas.js";
-import { formatNumber } from "./format.js";
+import { formatNumber, lengthUnit } from "./format.js";
 import { isCubic } from "./side.js";
-import { INSET } from "./timeline.js";
 
 const SAMPLES = 320;
 const MAX_DOTS = 160; // keys per track drawn as dots
 const MAX_WEIGHTS = 12; // morph targets drawn
-const TITLE = 20; // px above a graph
+const TITLE = 22; // px above a graph
+const FOOT = 8; // px below it
+const MIN_LABEL_PX = 20; // between labels of values
+const MIN_RANGE_PER_VALUE = 1e-3; // of a graph; less is rounding
+const MIN_RANGE_DEGREES = 1;
 const COLORS = ["--x", "--y", "--z", "--w"];
 const AXES = ["x", "y", "z", "w"];
-const UNITS = { translation: "m", rotation: "", scale: "×", weights: "" };
+const PATH_UNITS = { translation: "m", rotation: "", scale: "×", weights: "" };
+const UNIT_TEXTS = { m: " m", "": "", "×": "×", "°": "°" };
 
 export class Curves {
   constructor(panel, seek) {
     this.canvas = panel.querySelector("canvas");
-    this.hover = null;
-    this.seek = seek;
-    const timeAt = (event) => {
-      const width = this.canvas.clientWidth - 2 * INSET;
-      return Math.max(0, Math.min(1, (event.offsetX - INSET) / width)) * this.duration;
-    };
+    const timeAt = (event) => timeAxis(this.canvas.clientWidth, this.duration).time(event.offsetX);
     this.canvas.addEventListener("pointermove", (event) => {
       if (event.buttons) seek(timeAt(event));
     });
@@ -36,41 +36,45 @@ export class Curves {
   draw({ sides, duration, time, unit, message }) {
     this.duration = Math.max(duration, 1e-6);
     const { context, width, height } = begin(this.canvas);
+    const axis = timeAxis(width, this.duration);
     const paths = [...new Set(sides.flatMap((side) => side.tracks.map((each) => each.path)))];
     if (!paths.length) {
       context.fillStyle = ink("--dim");
       context.font = "13px system-ui, sans-serif";
-      context.fillText(message, INSET, height / 2);
+      context.fillText(message, axis.left, height / 2);
       return;
     }
+    context.fillStyle = ink("--line");
+    context.globalAlpha = 0.6;
+    for (const at of axis.labels) context.fillRect(Math.round(axis.x(at)), 0, 1, height);
+    context.globalAlpha = 1;
     const part = height / paths.length;
     for (const [i, path] of paths.entries()) {
       const graphs = sides.flatMap((side, which) =>
         side.tracks.filter((each) => each.path === path).map((each) => ({ which, ...graph(each, side.rest, unit) })),
       );
-      this.#drawGraph(context, { graphs, path, time, top: i * part, height: part, width, isFirst: i === 0 });
+      if (i) {
+        context.fillStyle = ink("--line");
+        context.fillRect(0, Math.round(i * part), width, 1);
+      }
+      this.#drawGraph(context, { graphs, path, time, top: i * part, height: part, axis });
     }
     context.fillStyle = ink("--accent");
-    context.fillRect(INSET + ((width - 2 * INSET) * time) / this.duration - 0.75, 0, 1.5, height);
+    context.fillRect(axis.x(time) - 0.75, 0, 1.5, height);
   }
 
-  #drawGraph(context, { graphs, path, time, top, height, width, isFirst }) {
+  #drawGraph(context, { graphs, path, time, top, height, axis }) {
     const samples = Array.from({ length: SAMPLES + 1 }, (_, i) => (this.duration * i) / SAMPLES);
     const lines = graphs.map((each) => samples.map(each.at));
     const all = lines.flat(2);
     let [low, high] = [Math.min(...all), Math.max(...all)];
-    const least = path === "rotation" ? 1 : 1e-3;
-    if (high - low < least) [low, high] = [low - least, high + least];
-    const x = (at) => INSET + ((width - 2 * INSET) * at) / this.duration;
-    const y = (value) => top + height - 6 - ((height - TITLE - 10) * (value - low)) / (high - low);
-    if (!isFirst) {
-      context.fillStyle = ink("--line");
-      context.fillRect(0, Math.round(top), width, 1);
-    }
-    if (low < 0 && high > 0) {
-      context.fillStyle = ink("--line");
-      context.fillRect(INSET, Math.round(y(0)), width - 2 * INSET, 1);
-    }
+    const size = Math.max(Math.abs(low), Math.abs(high));
+    const least = graphs[0].unit === "°" ? MIN_RANGE_DEGREES : size * MIN_RANGE_PER_VALUE;
+    if (high - low < least || !size) [low, high] = [low - (least || 1), high + (least || 1)];
+    const { x } = axis;
+    const y = (value) => top + height - FOOT - ((height - TITLE - FOOT) * (value - low)) / (high - low);
+    const values = roundNumbers(low, high, (height - TITLE - FOOT) / MIN_LABEL_PX);
+    drawValues(context, { values, size, unit: graphs[0].unit, y, axis });
     for (const [g, each] of graphs.entries()) {
       context.setLineDash(each.which ? [4, 3] : []);
       context.globalAlpha = each.which ? 0.75 : 1;
@@ -85,13 +89,12 @@ export class Curves {
       drawKeys(context, each, x, y);
     }
     context.globalAlpha = 1;
-    this.#drawTitle(context, graphs, path, time, top);
+    this.#drawTitle(context, graphs, path, time, top, axis.left);
   }
 
-  #drawTitle(context, graphs, path, time, top) {
+  #drawTitle(context, graphs, path, time, top, left) {
     context.font = "600 11px system-ui, sans-serif";
     context.fillStyle = ink("--text");
-    let left = INSET;
     const write = (text) => {
       context.fillText(text, left, top + 15);
       left += context.measureText(text).width + 10;
@@ -103,11 +106,24 @@ export class Curves {
     for (let c = 0; c < first.size; c++) {
       context.fillStyle = ink(COLORS[c % 4]);
       const name = path === "weights" ? `${c}` : AXES[c];
-      write(`${name} ${formatNumber(values[c])}${first.unit}`);
+      write(`${name} ${formatNumber(values[c])}${UNIT_TEXTS[first.unit]}`);
     }
     context.fillStyle = ink("--dim");
-    write(`${first.times.length} keys`);
+    write(first.times.length === 1 ? "1 key" : `${first.times.length} keys`);
   }
+}
+
+/** The value axis: labels with their unit, and a line across the graph at each. */
+function drawValues(context, { values, size, unit, y, axis }) {
+  const [name, factor] = unit === "m" ? lengthUnit(size) : [unit, 1];
+  context.textAlign = "right";
+  for (const value of values) {
+    context.fillStyle = ink("--line");
+    context.fillRect(axis.left, Math.round(y(value)), axis.right - axis.left, 1);
+    context.fillStyle = ink("--dim");
+    context.fillText(`${Number((value * factor).toPrecision(6))}${UNIT_TEXTS[name] ?? ` ${name}`}`, axis.left - 8, y(value) + 4);
+  }
+  context.textAlign = "left";
 }
 
 function drawKeys(context, { times, size, at, tangents, which }, x, y) {
@@ -152,8 +168,7 @@ function graph({ path, track }, rest, unit) {
   }
   const size = path === "weights" ? Math.min(width, MAX_WEIGHTS) : width;
   const tangents = isCubic(track) ? tangentsOf(track, width) : null;
-  const suffix = UNITS[path] && path === "translation" ? ` ${UNITS[path]}` : "";
-  return { times, size, unit: suffix, at: (time) => raw(time).slice(0, size), tangents };
+  return { times, size, unit: PATH_UNITS[path], at: (time) => raw(time).slice(0, size), tangents };
 }
 
 /** Slopes per second; glTF stores in-tangent, value and out-tangent of each key. */

@@ -6,8 +6,13 @@ const LENGTHS = [[1, "m", 1], [1e-2, "cm", 1e2], [1e-4, "mm", 1e3], [1e-7, "µm"
 /** "0.41 mm", "12 cm", "1.71 m". */
 export function formatLength(metres) {
   if (!metres) return "0 mm";
-  const [, unit, factor] = LENGTHS.find(([least]) => metres >= least);
+  const [unit, factor] = lengthUnit(metres);
   return `${Number((metres * factor).toPrecision(3))} ${unit}`;
+}
+
+/** Unit of lengths up to `metres`, and what to multiply metres by: ["cm", 100]. */
+export function lengthUnit(metres) {
+  return LENGTHS.find(([least]) => metres >= least).slice(1);
 }
 
 export function formatTime(seconds) {

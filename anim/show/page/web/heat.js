@@ -3,7 +3,7 @@
 // three.js poses both on the CPU (0.4 to 2 µs per vertex), so that any number of morph targets and joints works.
 
 import { BufferAttribute, Color, Vector3 } from "three";
-import { setColors } from "./materials.js";
+import { lookOf, setColors } from "./materials.js";
 
 export const MAX_LIVE_VERTICES = 60000; // more are colored only while paused
 const STOPS = [[0, 0xdedbd6], [0.35, 0xffd166], [0.7, 0xf3722c], [1, 0xb5121b]].map(([at, hex]) => [at, new Color(hex)]);
@@ -114,11 +114,11 @@ export function measure(spans, visit = () => {}) {
 export function paint(spans, scale) {
   const color = new Color();
   for (const mesh of new Set(spans.map((span) => span.after))) {
-    mesh.userData.heatColors ??= new BufferAttribute(new Float32Array(3 * count(mesh)), 3);
-    setColors(mesh, mesh.userData.heatColors);
+    lookOf(mesh).heatColors ??= new BufferAttribute(new Float32Array(3 * count(mesh)), 3);
+    setColors(mesh, lookOf(mesh).heatColors);
   }
   return measure(spans, (mesh, vertex, error) => {
-    heatColor(error / scale, color).toArray(mesh.userData.heatColors.array, 3 * vertex);
+    heatColor(error / scale, color).toArray(lookOf(mesh).heatColors.array, 3 * vertex);
   });
 }
 

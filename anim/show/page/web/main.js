@@ -3,15 +3,16 @@
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
 import { bindings, fit, isDark } from "./bindings.js";
+import { markClip, sortClips } from "./clips.js";
 import { facts, readFile } from "./data.js";
 import { $, setPressed } from "./dom.js";
 import { formatLength } from "./format.js";
 import { GRADIENT } from "./heat.js";
 import { listenToKeys, openSheet } from "./keyboard.js";
 import { Player } from "./player.js";
-import { fillSidebar, markClip, markNode } from "./sidebar.js";
+import { fillSidebar, markNode, markTab, scrollToChosen } from "./sidebar.js";
 import { Side } from "./side.js";
-import { SHOWS, SIDES, UNITS, cycle, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
+import { SHOWS, SIDES, UNITS, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
 
 /** Bring the page in line with what changed. */
 function render(player, changed) {
@@ -32,6 +33,7 @@ function render(player, changed) {
     player.drawTimeline();
   }
   if (has("show")) {
+    if (state.show.has("curves") && $("#curves").hidden && state.node === null) update({ tab: "nodes" }); // to choose one
     for (const name of SHOWS) setPressed($(`#show-${name}`), state.show.has(name));
     $("#curves").hidden = !state.show.has("curves");
     $("#legend").hidden = !(state.show.has("heat") && player.sides.length > 1);
@@ -45,7 +47,10 @@ function render(player, changed) {
     $("#play").classList.toggle("playing", state.playing);
     $("#play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
   }
-  if (has("unit")) $("#unit").textContent = state.unit === "degrees" ? "degrees from rest" : "values";
+  if (has("unit")) for (const name of UNITS) setPressed($(`#unit-${name}`), state.unit === name);
+  if (has("tab")) markTab(state.tab);
+  if (has("sort")) sortClips(player.sides[0], facts);
+  if (has("clip", "node", "tab", "sort")) scrollToChosen();
   if (has("heatScale")) $("#heat-most").textContent = formatLength(state.heatScale);
   if (has("speed")) $("#speed").value = String(state.speed);
   if (has("loop")) $("#loop").value = state.loop;
@@ -62,6 +67,8 @@ function hashOf(player) {
     side: state.side === "both" ? null : state.side,
     theme: state.theme === "auto" ? null : state.theme,
     unit: state.unit === "degrees" ? null : state.unit,
+    list: state.tab === player.firstTab ? null : state.tab,
+    sort: state.sort || null,
     speed: state.speed === 1 ? null : state.speed,
     loop: state.loop === "loop" ? null : state.loop,
     scale: state.heatScale === player.ownHeatScale ? null : state.heatScale,
@@ -76,7 +83,7 @@ function connect(player) {
   $("#fit").addEventListener("click", () => fit(player));
   $("#theme").addEventListener("click", () => update({ theme: isDark() ? "light" : "dark" }));
   $("#menu").addEventListener("click", () => document.body.classList.toggle("with-side"));
-  $("#unit").addEventListener("click", () => cycle("unit", UNITS));
+  for (const name of UNITS) $(`#unit-${name}`).addEventListener("click", () => update({ unit: name }));
   $("#speed").addEventListener("change", (event) => update({ speed: Number(event.target.value) }));
   $("#loop").addEventListener("change", (event) => update({ loop: event.target.value }));
   for (const name of SHOWS) $(`#show-${name}`).addEventListener("click", () => toggleShow(name));
@@ -95,6 +102,21 @@ function connect(player) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => render(player, new Set(["theme"])));
 }
 
+/** What rows of the lists do; on a phone, where the lists cover the picture, they close. */
+function actions(player) {
+  const closing = (action) => (argument) => {
+    action(argument);
+    document.body.classList.remove("with-side");
+  };
+  return {
+    chooseClip: closing((index) => player.chooseClip(index)),
+    chooseNode: closing((node) =>
+      update({ node: state.node === node ? null : node, show: new Set([...state.show, "curves"]) }),
+    ),
+    follow: closing((link) => player.follow(link)),
+  };
+}
+
 /** The state that the URL, else the page, asks for. */
 function begin(player) {
   const [side] = player.sides;
@@ -103,7 +125,8 @@ function begin(player) {
   const nodes = [...side.nodes.values()];
   const node = nodes.find((each) => each.name === asked.node) ?? nodes.find((each) => `#${each.index}` === asked.node);
   const { theme, unit, speed, loop } = asked;
-  update({ theme, unit, speed, loop, side: asked.side });
+  const tab = $(`#tab-${asked.tab}`) ? asked.tab : player.firstTab;
+  update({ theme, unit, speed, loop, tab, sort: asked.sort, side: asked.side });
   if (side.clips.length) player.chooseClip(Math.max(clip, 0), asked.time ?? 0);
   fit(player);
   player.resetHeatScale();
@@ -124,16 +147,10 @@ async function main() {
     if (bytes) sides.push(new Side(await loader.parseAsync(bytes, ""), facts.files[i]));
   }
   document.body.classList.toggle("pair", sides.length > 1);
+  document.body.classList.toggle("static", !sides[0].clips.length);
   $("#legend .scale").style.background = GRADIENT;
   const player = new Player(sides);
-  fillSidebar(sides, facts, {
-    chooseClip: (index) => {
-      player.chooseClip(index);
-      document.body.classList.remove("with-side");
-    },
-    chooseNode: (node) => update({ node: state.node === node ? null : node, show: new Set([...state.show, "curves"]) }),
-    follow: (link) => player.follow(link),
-  });
+  player.firstTab = fillSidebar(sides, facts, actions(player));
   connect(player);
   begin(player);
   player.draw();

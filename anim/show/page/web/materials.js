@@ -3,12 +3,19 @@
 import { DoubleSide, MeshLambertMaterial } from "three";
 
 const CLAY_COLOR = 0xb9b2a8;
+const looks = new WeakMap();
+
+/** Materials and colors of a mesh; not in its userData, which three.js writes as JSON, textures too, for each clone. */
+export function lookOf(mesh) {
+  if (!looks.has(mesh)) looks.set(mesh, { own: mesh.material, ownColors: mesh.geometry.attributes.color ?? null });
+  return looks.get(mesh);
+}
 
 /** Give every mesh of a side the material of the chosen view. heated: meshes with heat in their colors. */
 export function applyMaterials(side, show, heated) {
   for (const mesh of side.meshes) {
     const wanted = heated.has(mesh) ? heatMaterial(mesh) : show.has("clay") ? clayMaterial(mesh) : null;
-    mesh.material = wanted ?? mesh.userData.ownMaterial;
+    mesh.material = wanted ?? lookOf(mesh).own;
     for (const material of [mesh.material].flat()) {
       if ("wireframe" in material) material.wireframe = show.has("wire");
     }
@@ -17,13 +24,11 @@ export function applyMaterials(side, show, heated) {
 }
 
 function clayMaterial(mesh) {
-  mesh.userData.clay ??= plain(mesh, { color: CLAY_COLOR });
-  return mesh.userData.clay;
+  return (lookOf(mesh).clay ??= plain(mesh, { color: CLAY_COLOR }));
 }
 
 function heatMaterial(mesh) {
-  mesh.userData.heat ??= plain(mesh, { vertexColors: true });
-  return mesh.userData.heat;
+  return (lookOf(mesh).heat ??= plain(mesh, { vertexColors: true }));
 }
 
 function plain(mesh, options) {
@@ -32,15 +37,13 @@ function plain(mesh, options) {
 
 /** Put the colors of heat into a mesh's geometry; its own are kept. */
 export function setColors(mesh, colors) {
-  const data = mesh.userData;
-  if (data.ownColors === undefined) data.ownColors = mesh.geometry.attributes.color ?? null;
   if (mesh.geometry.attributes.color !== colors) mesh.geometry.setAttribute("color", colors);
   colors.needsUpdate = true;
 }
 
 function restoreColors(mesh) {
-  const own = mesh.userData.ownColors;
-  if (own === undefined || mesh.geometry.attributes.color === own) return;
+  const own = lookOf(mesh).ownColors;
+  if ((mesh.geometry.attributes.color ?? null) === own) return;
   if (own) mesh.geometry.setAttribute("color", own);
   else mesh.geometry.deleteAttribute("color");
 }

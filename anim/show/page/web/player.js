@@ -84,7 +84,6 @@ export class Player {
     if (clip !== undefined && clip !== null && clip !== state.clip) this.chooseClip(clip);
     if (node !== undefined && node !== null) update({ node });
     if (time !== undefined && time !== null) this.seek(time, { pause: true });
-    document.body.classList.remove("with-side");
   }
 
   nextKey(direction) {
@@ -138,7 +137,7 @@ export class Player {
     const heat = isShown && this.pairs.isEmpty ? nodeColors(this.sides, state.heatScale) : null;
     this.stage.draw((side) => {
       const { bones, onion } = this.extras[this.sides.indexOf(side)];
-      onion.update(state.show.has("onion"), state.time);
+      onion.update(state.show.has("onion"), state.time, isShown);
       const colors = side === this.sides[1] ? heat : null;
       bones.update(state.show.has("bones"), this.stage.radius, this.#nodeIn(side), colors);
     });

@@ -1,6 +1,7 @@
 // One file: its scene, its pose at a time, its nodes and their tracks.
 
 import { AnimationMixer, DirectionalLight, Group, HemisphereLight, Scene } from "three";
+import { lookOf } from "./materials.js";
 
 export class Side {
   constructor(gltf, about) {
@@ -59,7 +60,7 @@ function lights() {
 
 function prepareMesh(mesh) {
   mesh.frustumCulled = false; // three.js culls by the bounds at rest
-  mesh.userData.ownMaterial = mesh.material;
+  lookOf(mesh); // while the material is its own
   for (const material of [mesh.material].flat()) {
     // Metal is black without surroundings, and those cost seconds on software GL
     if ("metalness" in material) material.metalness = 0;

@@ -1,31 +1,50 @@
-// The list beside the picture: clips, findings and worst positions, nodes, notes.
+// The lists beside the picture, one at a time: findings or errors, clips, nodes, files.
 
+import { clipList } from "./clips.js";
 import { $, make, setPressed } from "./dom.js";
-import { formatBytes, formatLength, formatTime } from "./format.js";
+import { filtered } from "./filter.js";
+import { formatBytes } from "./format.js";
+import { state, update } from "./state.js";
 
-const MIN_FILTERED = 12; // nodes from which on there is a filter
-const MAX_ROWS = 8; // of a panel, before the rest is folded
 const INDENT_PX = 11;
 const MAX_INDENT = 10;
 
-/** Fill the sidebar. actions: {chooseClip, chooseNode, follow}. */
+/** Fill the sidebar, and return the name of the list that matters most. actions: {chooseClip, chooseNode, follow}. */
 export function fillSidebar(sides, facts, actions) {
-  const list = $("#side");
-  const panels = (facts.panels ?? []).map((panel) => panelSection(panel, actions));
-  const clips = clipSection(sides[0], facts, actions);
-  list.append(...(sides.length > 1 ? [...panels, clips] : [clips, ...panels])); // of two files the errors matter most
-  list.append(nodeSection(sides[0], actions), fileSection(facts));
+  const isPair = sides.length > 1;
+  const panels = facts.panels ?? [];
+  const numNotes = facts.files.reduce((sum, file) => sum + file.notes.length, 0);
+  const lists = [
+    ["report", isPair ? "Errors" : "Findings", panels[0]?.count, panels.map((panel) => panelSection(panel, actions))],
+    ["clips", "Clips", sides[0].clips.length, clipList(sides[0], facts, actions.chooseClip)],
+    ["nodes", "Nodes", sides[0].nodes.size, nodeList(sides[0], actions)],
+    ["files", isPair ? "Files" : "File", numNotes || "", fileList(facts)],
+  ].filter(([, , , children]) => children.length);
+  const tabs = lists.map(([name, title, count]) =>
+    make(
+      "button",
+      { role: "tab", id: `tab-${name}`, "data-tab": name, "aria-controls": `list-${name}`, onclick: () => update({ tab: name }) },
+      title,
+      make("span", { class: "dim" }, String(count ?? "")),
+    ),
+  );
+  const bar = make("div", { role: "tablist", "aria-label": "Lists" }, ...tabs);
+  bar.addEventListener("keydown", (event) => moveTab(event, tabs));
+  const bodies = lists.map(([name, , , children]) =>
+    make("div", { role: "tabpanel", id: `list-${name}`, "aria-labelledby": `tab-${name}` }, ...children),
+  );
+  $("#side").append(bar, ...bodies);
+  $("#side").addEventListener("keydown", moveRow);
+  return panels.length || sides[0].clips.length ? lists[0][0] : "nodes";
 }
 
-export function markClip(index) {
-  for (const button of document.querySelectorAll("[data-clip]")) {
-    setPressed(button, Number(button.dataset.clip) === index);
+export function markTab(name) {
+  for (const tab of document.querySelectorAll("[data-tab]")) {
+    const isChosen = tab.dataset.tab === name;
+    tab.setAttribute("aria-selected", isChosen ? "true" : "false");
+    tab.tabIndex = isChosen ? 0 : -1;
+    $(`#list-${tab.dataset.tab}`).hidden = !isChosen;
   }
-}
-
-/** Scroll the list to a clip chosen by a key; one chosen in the list is in sight. */
-export function scrollToClip(index) {
-  document.querySelector(`[data-clip="${index}"]`)?.scrollIntoView({ block: "nearest" });
 }
 
 export function markNode(index, animated) {
@@ -35,28 +54,40 @@ export function markNode(index, animated) {
   }
 }
 
-function clipSection(side, facts, { chooseClip }) {
-  const longest = Math.max(...side.clips.map((clip) => clip.duration), 1e-6);
-  const rows = side.clips.map((clip, i) => {
-    const error = facts.errors?.[i]?.max;
-    const bar = make("i", { class: "bar" });
-    bar.style.setProperty("--part", clip.duration / longest);
-    return make(
-      "button",
-      { class: "row", "data-clip": i, title: side.clipNames[i], onclick: () => chooseClip(i) },
-      make("span", { class: "name" }, side.clipNames[i]),
-      error === undefined ? null : make("span", { class: error ? "hot" : "dim" }, formatLength(error)),
-      make("span", { class: "dim" }, formatTime(clip.duration)),
-      bar,
-    );
-  });
-  const empty = make("p", { class: "dim" }, "No animation in this file.");
-  return section(`Clips`, String(side.clips.length), ...(rows.length ? rows : [empty]));
+/** Scroll the chosen row of each list into sight: one that was chosen by a key, a link or a click on the picture. */
+export function scrollToChosen() {
+  for (const row of document.querySelectorAll('#side .row[aria-pressed="true"]')) row.scrollIntoView({ block: "nearest" });
 }
 
-function nodeSection(side, { chooseNode }) {
-  const nodes = [...side.nodes.values()];
-  const rows = nodes.map((node) => {
+/** Put the cursor in the filter of the list that is shown, if it has one. */
+export function focusFilter() {
+  document.body.classList.add("with-side");
+  $(`#list-${state.tab} input[type="search"]`)?.focus();
+}
+
+/** ← → between tabs, as readers of screens expect. */
+function moveTab(event, tabs) {
+  const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+  if (!step) return;
+  event.preventDefault();
+  event.stopPropagation();
+  const next = tabs[(tabs.indexOf(event.target.closest("[data-tab]")) + step + tabs.length) % tabs.length];
+  update({ tab: next.dataset.tab });
+  next.focus();
+}
+
+/** ↑ ↓ between the rows of the list, from its filter too. */
+function moveRow(event) {
+  const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+  if (!step || event.target.tagName === "SELECT") return;
+  const rows = [...$(`#list-${state.tab}`).querySelectorAll("button.row")].filter((row) => !row.hidden);
+  const next = rows[rows.indexOf(event.target.closest(".row")) + step];
+  event.preventDefault();
+  (next ?? (step < 0 ? $(`#list-${state.tab} input[type="search"]`) : null))?.focus();
+}
+
+function nodeList(side, { chooseNode }) {
+  const rows = [...side.nodes.values()].map((node) => {
     const button = make(
       "button",
       { class: "row node", "data-node": node.index, title: node.name, onclick: () => chooseNode(node.index) },
@@ -65,39 +96,43 @@ function nodeSection(side, { chooseNode }) {
     button.style.paddingInlineStart = `${10 + INDENT_PX * Math.min(Math.max(node.depth - 1, 0), MAX_INDENT)}px`;
     return button;
   });
-  const filter = make("input", { type: "search", placeholder: "Filter nodes", "aria-label": "Filter nodes" });
-  filter.addEventListener("input", () => {
-    const text = filter.value.toLowerCase();
-    rows.forEach((row, i) => (row.hidden = !nodes[i].name.toLowerCase().includes(text)));
-  });
-  const found = section("Nodes", String(nodes.length), ...(nodes.length >= MIN_FILTERED ? [filter] : []), ...rows);
-  found.classList.add("nodes");
-  return found;
+  return filtered(rows, "nodes");
 }
 
 /** A table of Python's: rows of cells, each row a link to a clip, node and time where it has one. */
 function panelSection(panel, { follow }) {
-  const rows = panel.rows.map(({ cells, link, level }) => {
+  const followRow = (row, link) => {
+    document.querySelector("#side [aria-current]")?.removeAttribute("aria-current");
+    row.setAttribute("aria-current", "true");
+    follow(link);
+  };
+  const rows = panel.rows.map(({ cells, text, advice, link, level }) => {
     const [name, ...others] = cells;
     const parts = [
       make("span", { class: "name" }, name),
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
+      text ? make("span", { class: "text" }, text) : null,
+      advice ? make("span", { class: "text dim" }, ...unbroken(advice)) : null,
     ];
-    // A sentence, not a table; or a position, whose name has a line of its own
-    const shape = !others.length ? "long" : others.length > 1 && link ? "deep" : "";
-    const attributes = { class: `row ${shape} ${level ?? ""}`, title: cells.join("  ") };
+    // A position or a finding, whose name has a line of its own
+    const shape = text || (others.length > 1 && link) ? "deep" : "";
+    const attributes = { class: `row ${shape} ${level ?? ""}` };
     return link
-      ? make("button", { ...attributes, "data-link": "", onclick: () => follow(link) }, ...parts)
+      ? make("button", { ...attributes, "data-link": "", onclick: (event) => followRow(event.currentTarget, link) }, ...parts)
       : make("div", attributes, ...parts);
   });
-  if (rows.length <= MAX_ROWS + 1) return section(panel.title, panel.count ?? "", ...rows);
-  const more = make("details", { class: "more" }, make("summary", {}, `${rows.length - MAX_ROWS} more`));
-  more.append(...rows.slice(MAX_ROWS));
-  return section(panel.title, panel.count ?? "", ...rows.slice(0, MAX_ROWS), more);
+  const about = panel.about ? make("p", { class: "about" }, panel.about) : null;
+  const title = panel.title === "Findings" ? null : make("h2", {}, panel.title); // the tab has this name
+  return make("section", {}, title, about, ...rows);
 }
 
-function fileSection(facts) {
-  const rows = facts.files.flatMap((file) => [
+/** Advice in which options of commands stay on one line. */
+function unbroken(advice) {
+  return advice.split(/(gltf-anim|--\S+)/).map((part, i) => (i % 2 ? make("span", { class: "option" }, part) : part));
+}
+
+function fileList(facts) {
+  return facts.files.flatMap((file) => [
     make(
       "div",
       { class: "row" },
@@ -106,14 +141,4 @@ function fileSection(facts) {
     ),
     ...file.notes.map((note) => make("p", { class: "note" }, note)),
   ]);
-  return section(facts.files.length > 1 ? "Files" : "File", "", ...rows);
-}
-
-function section(title, count, ...children) {
-  return make(
-    "details",
-    { open: "" },
-    make("summary", {}, title, make("span", { class: "dim" }, count)),
-    ...children,
-  );
 }

@@ -18,6 +18,8 @@ export const state = {
   side: "both",
   heatScale: 0, // m that are fully red
   unit: "degrees", // of rotation curves: degrees from rest, or values
+  tab: "clips", // the list that is shown
+  sort: "", // of the list of clips, "" for the file's order
   theme: "auto",
 };
 
@@ -62,6 +64,8 @@ export function readHash(defaults) {
     speed: SPEEDS.includes(number("speed")) ? number("speed") : 1,
     loop: LOOPS.includes(pick("loop")) ? pick("loop") : "loop",
     scale: number("scale"),
+    tab: pick("list"),
+    sort: pick("sort") ?? "",
   };
 }
 
