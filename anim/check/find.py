@@ -26,11 +26,18 @@ def find_grouped(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple
 
     Costly rules are left out.
     """
-    result: list[Finding] = []
+    return tuple(finding for finding, _ in group_occurrences(file, selection))
+
+
+def group_occurrences(
+    file: CheckedFile, selection: RuleSelection = DEFAULT
+) -> list[tuple[Finding, Sequence[Occurrence]]]:
+    """Return the findings of `find_grouped`, each with its occurrences."""
+    result: list[tuple[Finding, Sequence[Occurrence]]] = []
     for rule, found in occurrences(file, selection, costly=False):
         parts: Sequence[Sequence[Occurrence]] = [found] if rule.problem is not None else [[each] for each in found]
-        result += (rule.finding(part, file.facts.clips, selection.severity(rule)) for part in parts)
-    return tuple(result)
+        result += ((rule.finding(part, file.facts.clips, selection.severity(rule)), part) for part in parts)
+    return result
 
 
 def occurrences(

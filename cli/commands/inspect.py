@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from anim.check.find import find_grouped
+from anim.check.find import group_occurrences
 from anim.check.finding import Severity
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.rules.invalid import fault_occurrences
@@ -152,7 +152,10 @@ def _check(done: list[Inspected], limit: Severity) -> None:
 def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:
     with checked_files.open_checked(path, selection, tracks=tracks) as (source, file):
         smooth = _smooth(file.contents, file.facts) if continuity else ()
-        return Inspected(source.name, source.size, file.facts, find_grouped(file)), smooth
+        groups = group_occurrences(file)
+        findings = tuple(finding for finding, _ in groups)
+        found = tuple(occurrences for _, occurrences in groups)
+        return Inspected(source.name, source.size, file.facts, findings, found), smooth
 
 
 def _unreadable(path: str, error: AnimError) -> Inspected:

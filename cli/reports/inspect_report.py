@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from anim.check.finding import Finding
+from anim.check.finding import Finding, Occurrence
 from anim.gltf.reading.reader import clip_name
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackReport
 from anim.units import plural
@@ -26,12 +26,13 @@ Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip an
 
 @dataclass(frozen=True, slots=True)
 class Inspected:
-    """A file's name, size, contents and findings."""
+    """A file's name, size, contents and findings. occurrences: of each finding, if they are known."""
 
     name: str
     file_bytes: int
     facts: Facts
     findings: tuple[Finding, ...]
+    occurrences: tuple[Sequence[Occurrence], ...] = ()
 
 
 def page(inspected: Inspected, smooth: Smoothness = (), *, tracks: bool) -> str:

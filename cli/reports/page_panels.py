@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
-from anim.check.finding import Finding, Severity
+from anim.check.finding import Finding, Occurrence, Severity
 from anim.gltf.document import Document
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport
 from anim.show.page.page import ClipFigure, PageLink, PagePanel, PageRow
@@ -22,12 +23,14 @@ HEALTHY = PageRow(("healthy: nothing found",))
 def report_panels(inspected: Inspected, document: Document) -> list[PagePanel]:
     """Return the findings of a file, most severe first, its skins and its contents."""
     order = list(Severity)
-    findings = sorted(inspected.findings, key=lambda each: order.index(each.severity))
-    rows = tuple(_finding_row(each, document) for each in findings) or (HEALTHY,)
+    groups = sorted(
+        zip(inspected.findings, inspected.occurrences, strict=True), key=lambda each: order.index(each[0].severity)
+    )
+    rows = tuple(_finding_row(*each, document) for each in groups) or (HEALTHY,)
     facts = inspected.facts
     skins = tuple(map(_skin_row, facts.skins))
     return [
-        PagePanel("Findings", rows, str(len(findings) or "")),
+        PagePanel("Findings", rows, str(len(groups) or "")),
         *([PagePanel("Skins", skins)] if skins else []),
         PagePanel("Contents", tuple(map(PageRow, _contents(inspected.file_bytes, facts)))),
     ]
@@ -94,20 +97,22 @@ def size_panels(about: OptimizeReport) -> list[PagePanel]:
     return [PagePanel("Size", rows)]
 
 
-def _finding_row(finding: Finding, document: Document) -> PageRow:
+def _finding_row(finding: Finding, found: Sequence[Occurrence], document: Document) -> PageRow:
     words = f"{finding.where}: {finding.problem}" if finding.where else finding.problem
     cells = (finding.name, finding.code)
-    return PageRow(cells, _link(finding, document), finding.severity.value, words, finding.advice)
+    links = [(each.label, _link(each, document)) for each in found]
+    parts = tuple((label, link) for label, link in links if link is not None) if len(found) > 1 else ()
+    return PageRow(cells, _link(finding, document), finding.severity.value, words, finding.advice, parts)
 
 
-def _link(finding: Finding, document: Document) -> PageLink | None:
-    """Clip, node and time that a finding is about; for one about a skin, its first joint."""
-    clip, node, skin = (_index(pattern, finding.pointer) for pattern in (_CLIP, _NODE, _SKIN))
+def _link(found: Finding | Occurrence, document: Document) -> PageLink | None:
+    """Clip, node and time that a finding or a part of it is about; for a skin, its first joint."""
+    clip, node, skin = (_index(pattern, found.pointer) for pattern in (_CLIP, _NODE, _SKIN))
     if skin is not None:
         node = document.json["skins"][skin]["joints"][0]
-    if clip is None and node is None and finding.time_s is None:
+    if clip is None and node is None and found.time_s is None:
         return None
-    return PageLink(clip, node, finding.time_s)
+    return PageLink(clip, node, found.time_s)
 
 
 def _index(pattern: re.Pattern[str], pointer: str) -> int | None:

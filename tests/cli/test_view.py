@@ -232,6 +232,9 @@ def test_the_page_of_inspect_has_what_its_text_has(fixture: Fixture, call: Call,
     assert {row["advice"] for row in rows} == {each["advice"] for each in report["findings"]}
     assert {row["cells"][0] for row in rows} == {each["name"] for each in report["findings"]}
     assert {row["level"] for row in rows} == {each["severity"] for each in report["findings"]}
+    several = next(row for row in rows if "parts" in row)
+    assert several["link"] == several["parts"][0]["link"]
+    assert len({part["link"]["clip"] for part in several["parts"]}) == len(several["parts"]) > 1
 
 
 @needs_page

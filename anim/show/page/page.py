@@ -65,13 +65,17 @@ class PageLink:
 
 @dataclass(frozen=True, slots=True)
 class PageRow:
-    """A row of a panel: its cells and link; its level: "error", "warning", "info" or ""; text and advice below."""
+    """A row of a panel: its cells and link; its level: "error", "warning", "info" or ""; text and advice below.
+
+    parts: labels and links of what the row sums up.
+    """
 
     cells: tuple[str, ...]
     link: PageLink | None = None
     level: str = ""
     text: str = ""
     advice: str = ""
+    parts: tuple[tuple[str, PageLink], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +212,8 @@ def _panel(panel: PagePanel) -> dict[str, Any]:
             "cells": row.cells,
             "level": row.level,
             **({"text": row.text, "advice": row.advice} if row.text else {}),
-            **({"link": {"clip": row.link.clip, "node": row.link.node, "time": row.link.time}} if row.link else {}),
+            **({"link": asdict(row.link)} if row.link else {}),
+            **({"parts": [{"label": label, "link": asdict(link)} for label, link in row.parts]} if row.parts else {}),
         }
         for row in panel.rows
     ]

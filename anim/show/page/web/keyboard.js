@@ -10,6 +10,7 @@ export function listenToKeys(bindings) {
     if (event.ctrlKey || event.metaKey || event.altKey || $("#keys").open) return;
     if (tag === "SELECT" || (tag === "INPUT" && event.target.type === "search")) return;
     if (event.key === " " && tag === "BUTTON" && event.target.id !== "play") return;
+    if (event.key === " " && tag === "SUMMARY") return;
     const binding = byKey.get(event.key.length === 1 ? event.key.toLowerCase() : event.key);
     if (!binding || binding.isShown === false) return;
     event.preventDefault();
@@ -27,7 +28,7 @@ export function listenToKeys(bindings) {
 
 /** Take the focus from a button that the mouse or a finger pressed, so that the space bar plays; keys keep theirs. */
 function releaseFocus(event) {
-  if (event.detail > 0) event.target.closest("button")?.blur();
+  if (event.detail > 0) event.target.closest("button, summary")?.blur();
 }
 
 const LABELS = { " ": "space", ArrowLeft: "←", ArrowRight: "→", Home: "Home", End: "End" };

@@ -29,6 +29,7 @@ export class Player {
     this.isLive = this.pairs.vertexCount <= MAX_LIVE_VERTICES;
     this.timeline = new Timeline($("#scrub"), (time) => this.seek(time, { pause: true }));
     this.curves = new Curves($("#curves"), (time) => this.seek(time, { pause: true }));
+    this.firstTab = ""; // name of the list that is shown at first
     this.isDirty = true;
     this.last = 0;
     this.frames = 0; // animation frames so far

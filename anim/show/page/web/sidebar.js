@@ -106,9 +106,9 @@ function panelSection(panel, { follow }) {
     row.setAttribute("aria-current", "true");
     follow(link);
   };
-  const rows = panel.rows.map(({ cells, text, advice, link, level }) => {
+  const rows = panel.rows.map(({ cells, text, advice, link, level, parts = [] }) => {
     const [name, ...others] = cells;
-    const parts = [
+    const columns = [
       make("span", { class: "name" }, name),
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
       text ? make("span", { class: "text" }, text) : null,
@@ -117,13 +117,22 @@ function panelSection(panel, { follow }) {
     // A position or a finding, whose name has a line of its own
     const shape = text || (others.length > 1 && link) ? "deep" : "";
     const attributes = { class: `row ${shape} ${level ?? ""}` };
-    return link
-      ? make("button", { ...attributes, "data-link": "", onclick: (event) => followRow(event.currentTarget, link) }, ...parts)
-      : make("div", attributes, ...parts);
+    const row = link
+      ? make("button", { ...attributes, "data-link": "", onclick: (event) => followRow(event.currentTarget, link) }, ...columns)
+      : make("div", attributes, ...columns);
+    return [row, parts.length ? partList(parts, followRow) : null];
   });
   const about = panel.about ? make("p", { class: "about" }, panel.about) : null;
   const title = panel.title === "Findings" ? null : make("h2", {}, panel.title); // the tab has this name
-  return make("section", {}, title, about, ...rows);
+  return make("section", {}, title, about, ...rows.flat());
+}
+
+/** Links to everything that a row sums up, folded. */
+function partList(parts, follow) {
+  const rows = parts.map(({ label, link }) =>
+    make("button", { class: "row", "data-link": "", onclick: (event) => follow(event.currentTarget, link) }, make("span", { class: "name" }, label)),
+  );
+  return make("details", { class: "parts" }, make("summary", {}, `all ${parts.length}`), ...rows);
 }
 
 /** Advice in which options of commands stay on one line. */
