@@ -13,6 +13,7 @@ from anim.simulation.comparison import Comparison
 SCHEMA = "simulate/1"
 PICTURED = ("compare", "history")  # fields for the picture alone
 SAFE_STEP_FRACTION = 0.9  # of the stability limit, for advice
+VERLET_LIMIT = 2.0  # of ω·h
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,12 +81,11 @@ def advise_step(omega_h: float, limit: float, step: float, integrator: str, rk4_
     """Return advice for a step beyond the stability limit: "ω·h = 2.4, verlet's limit is 2: --step 1/282 or …"."""
     if omega_h <= limit:
         return ""
-    words = (
-        f"ω·h = {omega_h:.3g}, {integrator}'s limit is {limit:.3g}" if limit else f"{integrator} always gains energy"
-    )
+    per_second = math.ceil(omega_h / (step * (limit or VERLET_LIMIT) * SAFE_STEP_FRACTION))
     if not limit:
-        return f"{words}: --integrator verlet"
-    per_second = math.ceil(omega_h / (step * limit * SAFE_STEP_FRACTION))
+        finer = f" --step 1/{per_second}" if omega_h > VERLET_LIMIT else ""
+        return f"{integrator} always gains energy: --integrator verlet{finer}"
+    words = f"ω·h = {omega_h:.3g}, {integrator}'s limit is {limit:.3g}"
     other = " or --integrator rk4" if integrator != "rk4" and omega_h < rk4_limit else ""
     return f"{words}: --step 1/{per_second}{other}"
 
