@@ -157,7 +157,10 @@ def _triangles(indices: Ints, mode: int) -> Ints:
 
 def _stack(parts: list[np.ndarray], influences: int, dtype: type) -> np.ndarray:
     """Parts (V, I) concatenated, padded with zeros to the same influence count."""
-    filled = [np.pad(part, ((0, 0), (0, influences - part.shape[1]))) for part in parts]
+    filled = [
+        part if part.shape[1] == influences else np.pad(part, ((0, 0), (0, influences - part.shape[1])))
+        for part in parts
+    ]
     return np.concatenate([np.empty((0, influences), dtype), *filled])
 
 

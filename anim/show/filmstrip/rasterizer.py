@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 
 MAX_BATCH_ROWS = 1 << 20  # rows of triangles drawn at a time
+MAX_BATCH_PIXELS = 1 << 16  # pixels of these rows at a time: temporary arrays fit into the processor's cache
 EDGE_TOLERANCE_PX = 1e-9  # pixels; tolerance of the inside test, to avoid gaps between adjacent triangles
 MIN_AREA_PX2 = 1e-12  # pixels²; triangles of less area are seen edge-on
 
@@ -87,10 +88,32 @@ def _draw(
     first = np.clip(np.ceil(low - 0.5 - EDGE_TOLERANCE_PX), 0, width).astype(np.int64)
     last = np.clip(np.floor(high - 0.5 + EDGE_TOLERANCE_PX), -1, width - 1).astype(np.int64)
     counts = np.maximum(last - first + 1, 0)
+    ends = np.cumsum(counts)
+    start = 0
+    while start < len(which):
+        done = int(ends[start - 1]) if start else 0
+        some = slice(start, max(int(np.searchsorted(ends, done + MAX_BATCH_PIXELS, side="right")), start + 1))
+        _draw_pixels(which[some], line[some], first[some], counts[some], near, chosen, seen, nearest, width, alpha_test)
+        start = some.stop
+
+
+def _draw_pixels(
+    which: Ints,
+    line: Ints,
+    first: Ints,
+    counts: Ints,
+    near: Floats,
+    chosen: Ints,
+    seen: Ints,
+    nearest: Floats,
+    width: int,
+    alpha_test: AlphaTest | None,
+) -> None:
+    """Draw `counts` pixels from column `first` on of rows `line` of triangles `which`."""
     row = np.repeat(np.arange(len(which)), counts)
     x = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
     plane = near[which]
-    level = plane[:, 1] * middle + plane[:, 2] + plane[:, 0] * 0.5
+    level = plane[:, 1] * (line + 0.5) + plane[:, 2] + plane[:, 0] * 0.5
     depth = level[row] + plane[row, 0] * x
     pixel = (line * width)[row] + x
     if alpha_test is not None:

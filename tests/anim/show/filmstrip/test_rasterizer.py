@@ -1,0 +1,31 @@
+"""Rasterization in batches: memory does not grow with the number of triangles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from anim.arrays import Ints
+from anim.show.filmstrip import rasterizer
+
+
+def test_batches_of_pixels_draw_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Triangles over most of the picture, some equal: the last one of equals is seen, whatever the batches."""
+    random = np.random.default_rng(4)
+    some = random.uniform(0, 40, (30, 3, 3))
+    corners = np.concatenate((some, some[::2]))
+    expected = rasterizer.visible_faces(corners, width=40, height=30)
+    sizes: list[int] = []
+    draw = rasterizer._draw_pixels
+
+    def called(which: Ints, line: Ints, first: Ints, counts: Ints, *more: Any) -> None:
+        sizes.append(int(counts.sum()))
+        draw(which, line, first, counts, *more)
+
+    monkeypatch.setattr(rasterizer, "_draw_pixels", called)
+    monkeypatch.setattr(rasterizer, "MAX_BATCH_PIXELS", 100)
+    found = rasterizer.visible_faces(corners, width=40, height=30)
+    assert np.array_equal(found, expected)
+    assert max(sizes) <= 100 < sum(sizes)
