@@ -1,4 +1,4 @@
-"""Run command lines one after the other in one process and write what each did, with time and memory, as JSON.
+"""Run command lines one after the other in one process and write what each did, with CPU time and memory, as JSON.
 
 python -m tests.cli.sweep < [[arg, …], …] > [[exit code, stdout bytes, stderr text, seconds, peak bytes so far], …]
 """
@@ -24,10 +24,10 @@ def outcomes(lines: Sequence[Sequence[str]]) -> Iterator[Outcome]:
     """Yield exit code, length of stdout, stderr, seconds and the process's peak memory after each command line."""
     for line in lines:
         out, err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True), io.StringIO()
-        began = time.perf_counter()
+        began = time.process_time()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = main.run(list(line))
-        seconds = time.perf_counter() - began
+        seconds = time.process_time() - began
         yield code, out.buffer.tell(), err.getvalue(), seconds, _peak()
 
 
