@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import operator
 from collections import Counter
 from collections.abc import Sequence
@@ -27,6 +26,8 @@ def first_equal(items: Sequence[tuple[Clip, ...]]) -> list[int]:
 
 def tracks_digest(clip: Clip) -> bytes:
     """Return a digest of a clip's tracks."""
+    import hashlib  # loads OpenSSL, and few files have clips to hash
+
     digest = hashlib.blake2b(digest_size=16)
     for track in clip.tracks:
         for part in _parts(track):
