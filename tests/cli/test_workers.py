@@ -12,8 +12,10 @@ import pytest
 
 from tests.cli.conftest import Find
 from tests.cli.running import TIMEOUT, started
+from tests.files import mark_slow
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="asks Linux for a process's children")
+CPU_S = 0.5  # after which a process is at work, on a busy machine too
 
 
 def working(asset: Find, tmp_path: Path) -> tuple[subprocess.Popen[bytes], list[int]]:
@@ -21,16 +23,20 @@ def working(asset: Find, tmp_path: Path) -> tuple[subprocess.Popen[bytes], list[
     line = ("optimize", asset("Knight.glb"), tmp_path / "out.glb", "--effort", "max", "--jobs", "2")
     run = started(*line, stdout=subprocess.PIPE)
     end = time.monotonic() + TIMEOUT
-    while len(children := _children(run.pid)) < 2:
+    while len(children := _children(run.pid)) < 2 or min(map(_cpu_seconds, children)) < CPU_S:
         assert run.poll() is None
         assert time.monotonic() < end
         time.sleep(0.02)
-    time.sleep(0.5)  # they are at work then
     return run, children
 
 
 def _children(pid: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def _cpu_seconds(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def wait_for_the_end(pids: list[int]) -> None:
@@ -48,7 +54,7 @@ def _runs(pid: int) -> bool:
         return False
 
 
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", mark_slow([0, 1], slow=[1]))
 def test_a_killed_worker_is_one_line_that_names_a_clip(which: int, asset: Find, tmp_path: Path) -> None:
     run, workers = working(asset, tmp_path)
     os.kill(workers[which], signal.SIGKILL)
@@ -63,7 +69,10 @@ def test_a_killed_worker_is_one_line_that_names_a_clip(which: int, asset: Find, 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("number", "code"), [("TERM", 143), ("HUP", 129), ("INT", 130), ("KILL", -9)])
+SIGNALS = [("TERM", 143), ("HUP", 129), ("INT", 130), ("KILL", -9)]
+
+
+@pytest.mark.parametrize(("number", "code"), mark_slow(SIGNALS, slow=[("HUP", 129), ("INT", 130)]))
 def test_nobody_works_on_when_the_command_was_stopped(number: str, code: int, asset: Find, tmp_path: Path) -> None:
     run, workers = working(asset, tmp_path)
     run.send_signal(signal.Signals[f"SIG{number}"])
