@@ -44,8 +44,11 @@ LARGE = ("BusterDrone/busterDrone.gltf", "Knight.glb", "Robot.glb")
 
 
 def mark_slow(values: Iterable[Any], slow: Container[Any] = LARGE) -> list[Any]:
-    """Return values for `parametrize`, of which the quick set leaves out those in `slow`."""
-    return [pytest.param(each, marks=pytest.mark.slow) if each in slow else each for each in values]
+    """Return values for `parametrize`, or tuples of them, of which the quick set leaves out those in `slow`."""
+    return [
+        pytest.param(*(each if isinstance(each, tuple) else (each,)), marks=pytest.mark.slow) if each in slow else each
+        for each in values
+    ]
 
 
 def opened(data: bytes, files: Mapping[str, bytes] | None = None) -> Document:

@@ -20,7 +20,7 @@ from anim.operations.resample import resample
 from anim.sampling import sample_pose
 from anim.sampling.world import world_by_node
 from tests.clips import about, clip, track
-from tests.files import glb_of, opened, opened_fixture, opened_path
+from tests.files import glb_of, mark_slow, opened, opened_fixture, opened_path
 from tests.judge import RATE, ClipVerdict, Verdict, judge, needs_judge
 
 pytestmark = needs_judge
@@ -156,7 +156,7 @@ def test_what_is_not_gltf_is_refused_in_threes_words(tmp_path: Path) -> None:
 # Against our own ruler
 
 
-@pytest.mark.parametrize("name", ["Fox.glb", "CesiumMan.glb", "Robot.glb"])
+@pytest.mark.parametrize("name", mark_slow(["Fox.glb", "CesiumMan.glb", "Robot.glb"]))
 def test_our_ruler_and_three_agree_on_real_files(asset: Find, name: str, tmp_path: Path) -> None:
     """Where and when three finds the worst, `anim` does; and our ruler overstates it by no more than its slack."""
     document = opened_path(asset(name))

@@ -155,19 +155,19 @@ def test_keys_that_hold_are_never_on_the_way(call: Call, tmp_path: Path) -> None
 
 
 ASSETS = (
-    "BitmojiRun.glb",
     "BoxAnimated.gltf",
     "CesiumMan.glb",
     "InterpolationTest.gltf",
-    "MorphStressTest.glb",
     "RiggedSimple.gltf",
 )
 LARGE = (
     "AnimationPointer/24_animation_pointer.gltf",
+    "BitmojiRun.glb",
     "BusterDrone/busterDrone.gltf",
     "Knight.glb",
+    "MorphStressTest.glb",
     "Robot.glb",
-)  # half a minute each
+)  # up to half a minute each
 
 
 @pytest.mark.parametrize("name", [*ASSETS, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)])

@@ -19,13 +19,13 @@ from anim.model import Mesh
 from fixtures.broken import pieces
 from tests.cli.conftest import Call, Find
 from tests.cli.running import help_line, refusal, stated_length
-from tests.files import glb_of, opened, opened_fixture, opened_path
+from tests.files import glb_of, mark_slow, opened, opened_fixture, opened_path
 from tests.judge import needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
 from tests.textured import UNKNOWN, looks, textured
 
 ASSETS = [
-    ("Fox.glb", "Survey"),
+    pytest.param("Fox.glb", "Survey", marks=pytest.mark.slow),
     ("CesiumMan.glb", "#0"),
     pytest.param("Knight.glb", "Cheer", marks=pytest.mark.slow),
     ("BitmojiRun.glb", "lbr_run_normal_anm_default"),
@@ -200,8 +200,17 @@ def test_at_most_256_targets(call: Call, source: Path, tmp_path: Path) -> None:
 
 
 @needs_validator
-@pytest.mark.parametrize("layout", ["morph", "flip-scale", "flip-visibility"])
-@pytest.mark.parametrize("options", [(), ("--space", "mesh"), ("--rigid",), ("--keep-skeleton",), ("--fps", "0.5")])
+@pytest.mark.parametrize("layout", mark_slow(["morph", "flip-scale", "flip-visibility"], slow=["flip-scale"]))
+@pytest.mark.parametrize(
+    "options",
+    [
+        (),
+        pytest.param(("--space", "mesh"), marks=pytest.mark.slow),
+        ("--rigid",),
+        pytest.param(("--keep-skeleton",), marks=pytest.mark.slow),
+        pytest.param(("--fps", "0.5"), marks=pytest.mark.slow),
+    ],
+)
 def test_the_validator_finds_nothing_new(call: Call, source: Path, layout: str, options: tuple[str, ...]) -> None:
     assert errors(validate(source.read_bytes())) == []
     baked(call, source, "--clip", "bend", "--layout", layout, *options)

@@ -19,7 +19,7 @@ from anim.gltf.io import container
 from anim.measure.inspect.contents import read_contents
 from anim.measure.inspect.inspect import inspect
 from tests.cli.conftest import Call, Find
-from tests.files import ASSETS, glb_of, opened_path
+from tests.files import ASSETS, glb_of, mark_slow, opened_path
 from tests.khronos import needs_validator, validate_many
 
 QUICK = (
@@ -41,6 +41,7 @@ LARGE = ("AnimationPointer/24_animation_pointer.gltf", "BusterDrone/busterDrone.
 DEFAULT = RuleSelection()
 EVERYTHING = RuleSelection(select=("ALL",), ignore=("GA109", "GA111"))  # whose fixes yield to that of GA102
 NAMES = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)]
+FIXED = ("CesiumMan.glb", "CubicMorph/01_cs_morph.gltf", "Fox.glb", "InterpolationTest.gltf", "vrm/test.vrma")
 
 
 def checked(document: Document) -> CheckedFile:
@@ -51,7 +52,7 @@ def checked(document: Document) -> CheckedFile:
 
 
 @needs_validator
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", mark_slow([*QUICK, *LARGE], slow={*QUICK, *LARGE}.difference(FIXED)))
 @pytest.mark.parametrize(
     ("selection", "unsafe"),
     [

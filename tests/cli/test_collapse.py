@@ -18,7 +18,7 @@ from tests.anim.show.reading import words
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, refusal, shell
 from tests.clips import clip, track
-from tests.files import opened_fixture
+from tests.files import mark_slow, opened_fixture
 
 
 def test_a_table_with_advice(call: Call, fixture: Fixture) -> None:
@@ -126,7 +126,10 @@ def edited(folder: Path, change: Callable[[GLTF2], object]) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+PICTURES = [("png", b"\x89PNG"), ("svg", b"<?xml")]
+
+
+@pytest.mark.parametrize(("ending", "start"), mark_slow(PICTURES, slow=PICTURES[1:]))
 def test_a_picture(ending: str, start: bytes, call: Call, fixture: Fixture, tmp_path: Path) -> None:
     out = tmp_path / f"tube.{ending}"
     run = call("collapse", fixture("tube"), "--plot", out)

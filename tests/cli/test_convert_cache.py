@@ -11,9 +11,12 @@ from anim.caches.registry import READABLE
 from tests.anim.caches.making import FACES, cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import help_line, refusal, shell
+from tests.files import mark_slow
 
 LOSSY = {".glb": 1e-4, ".gltf": 1e-4, ".png": 2e-4}
 EVERY = [ending for ending in READABLE if ending != ".stl"]
+PAIRS = [(first, second) for first in EVERY for second in EVERY]
+RING = list(zip(EVERY, (*EVERY[1:], EVERY[0]), strict=True))  # each is read and written once
 OPTIONS = {ending: ["--max-error", "0.1mm"] for ending in (".glb", ".gltf")}
 
 
@@ -30,8 +33,7 @@ def positions(path: Path) -> np.ndarray:
         return found
 
 
-@pytest.mark.parametrize("first", EVERY)
-@pytest.mark.parametrize("second", EVERY)
+@pytest.mark.parametrize(("first", "second"), mark_slow(PAIRS, slow=[pair for pair in PAIRS if pair not in RING]))
 def test_every_format_becomes_every_other(first: str, second: str, walk: Path, call: Call) -> None:
     one, two, back = walk.with_name(f"one{first}"), walk.with_name(f"two{second}"), walk.with_name("back.npz")
     call("convert-cache", walk, one, *OPTIONS.get(first, [])).product()

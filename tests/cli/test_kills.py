@@ -81,7 +81,7 @@ def pair_where_nothing_is(folder: Path) -> list[str]:
 PAIRS = [
     pair_in_place,
     pytest.param(pair_over_a_pair, marks=SLOW),
-    pair_beside_its_source,
+    pytest.param(pair_beside_its_source, marks=SLOW),
     pytest.param(pair_where_nothing_is, marks=SLOW),
 ]
 
@@ -134,7 +134,7 @@ def sequence(folder: Path) -> list[str]:
 @pytest.mark.parametrize(
     ("case", "first"),
     [
-        pytest.param(pc2, "c.pc2", id="pc2"),
+        pytest.param(pc2, "c.pc2", id="pc2", marks=SLOW),
         pytest.param(texture, "c.png", id="texture"),
         pytest.param(sequence, "c_00001.ply", id="sequence", marks=SLOW),
     ],

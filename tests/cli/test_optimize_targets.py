@@ -16,7 +16,7 @@ from tests.anim.caches.making import written
 from tests.anim.gltf.meshopt.packing import found_by_three
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call
-from tests.files import glb_of, opened, opened_path
+from tests.files import glb_of, mark_slow, opened, opened_path
 from tests.judge import needs_judge
 from tests.khronos import errors, needs_validator, validate
 
@@ -28,7 +28,7 @@ BOUND = "0.05%"
 @needs_validator
 @pytest.mark.parametrize("pointer", [False, True], ids=["weights", "pointer"])
 @pytest.mark.parametrize("mode", EXTENSIONS)
-@pytest.mark.parametrize("count", [65, 128])
+@pytest.mark.parametrize("count", mark_slow([65, 128], slow=[128]))
 def test_more_targets_than_a_row_holds(count: int, mode: str, pointer: bool, tmp_path: Path, call: Call) -> None:
     """Streams are valid, small, and three.js decodes the numbers that we do."""
     source, out = tmp_path / "face.glb", tmp_path / "small.glb"

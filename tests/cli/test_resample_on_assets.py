@@ -88,7 +88,7 @@ def _ends_on_grid(clip: dict[str, Any]) -> bool:
     return bool(abs(frames - round(frames)) < 1e-3)
 
 
-@pytest.mark.parametrize("name", ["Knight.glb", "Robot.glb", "Fox.glb"])
+@pytest.mark.parametrize("name", mark_slow(["Knight.glb", "Robot.glb", "Fox.glb"]))
 def test_real_files_never_grow_at_their_own_rate(name: str, call: Call, asset: Find, tmp_path: Path) -> None:
     call("resample", asset(name), tmp_path / "out.glb", "--fps", "24").product()
     assert (tmp_path / "out.glb").stat().st_size <= asset(name).stat().st_size * 1.01

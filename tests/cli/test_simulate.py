@@ -16,6 +16,7 @@ from anim.simulation.registry import SIMULATIONS
 from cli.commands import simulate
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import ROOT
+from tests.files import mark_slow
 
 # Options with the same name and another meaning: VRM's, a ball's or a body's, of a fabric or of the air.
 OWN_MEANING = {"sphere", "gravity", "stiffness", "drag", "density", "max_error", "integrator", "colliders"}
@@ -74,7 +75,7 @@ def test_an_unknown_kind_is_named_with_the_nearest(call: Call) -> None:
     assert run.err == "gltf-anim: simulate: no such kind 'particels'\nhelp: did you mean 'particles'?\n"
 
 
-@pytest.mark.parametrize("ending", ["json", "png"])
+@pytest.mark.parametrize("ending", mark_slow(["json", "png"], slow=["png"]))
 def test_springs_that_diverge_end_with_a_report_and_nothing_written(
     ending: str, fixture: Fixture, call: Call, tmp_path: Path
 ) -> None:

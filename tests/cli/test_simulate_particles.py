@@ -13,6 +13,7 @@ from anim.sampling.track import sample
 from tests.anim.simulation.rigid_bodies.cases import collider, document, node
 from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Player
+from tests.files import mark_slow
 from tests.judge import judge, needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
 
@@ -63,7 +64,7 @@ def test_three_js_shows_both_forms_alike(fixture: Fixture, call: Call, tmp_path:
 
 
 @needs_judge
-@pytest.mark.parametrize("form", ["node", "skin"])
+@pytest.mark.parametrize("form", mark_slow(["node", "skin"], slow=["node"]))
 def test_three_js_measures_the_error_of_removed_keys(form: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
     args = (*SPARKS, "--drag", "1", "--turbulence", "1", "--as", form)
     simulate(call, fixture("biped"), tmp_path / "full.glb", *args)

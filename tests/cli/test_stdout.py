@@ -14,6 +14,7 @@ import pytest
 from anim.errors import OutputError
 from cli.io import stdout
 from tests.cli.running import TIMEOUT, refusal, shell, started
+from tests.files import mark_slow
 
 LIMIT = "export PYTHONDONTWRITEBYTECODE=1; ulimit -f"  # kB a file; Python would leave halves of its compiled modules
 BUFFERING = ["PYTHONUNBUFFERED=", "PYTHONUNBUFFERED=1"]
@@ -28,10 +29,11 @@ PRODUCTS = {
     "--help": 1,
     "optimize --help": 1,
 }  # and kB that the disk takes of each
+PIPED = [*list(PRODUCTS)[:4], "bake walk.glb --clip walk --fps 30 -q"]
 
 
 @pytest.mark.parametrize("buffering", BUFFERING)
-@pytest.mark.parametrize("line", PRODUCTS)
+@pytest.mark.parametrize("line", mark_slow(PRODUCTS, slow=list(PRODUCTS)[1::2]))
 def test_a_disk_that_takes_a_part_is_said_in_one_line(line: str, buffering: str, walk: Path, tmp_path: Path) -> None:
     run = shell(f"{LIMIT} {PRODUCTS[line]}; {buffering} gltf-anim {line} > product", tmp_path)
     assert refusal(run, 3) == "gltf-anim: stdout: can't be written (file too large)"
@@ -39,7 +41,7 @@ def test_a_disk_that_takes_a_part_is_said_in_one_line(line: str, buffering: str,
 
 
 @pytest.mark.parametrize("buffering", BUFFERING)
-@pytest.mark.parametrize("line", [*list(PRODUCTS)[:4], "bake walk.glb --clip walk --fps 30 -q"])
+@pytest.mark.parametrize("line", mark_slow(PIPED, slow=PIPED[1:-1]))
 def test_a_pipe_that_does_not_block_gets_everything(
     line: str, buffering: str, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -170,9 +170,11 @@ def renamed(data: bytes, clips: Sequence[str]) -> bytes:
 
 
 def example_cases() -> Iterator[Any]:
-    """All examples; those of `optimize` are slow, and the README's run in the quick set."""
+    """All examples; the quick set runs the first of each command, but of `optimize`, and the README's."""
+    quick = {row.examples[0] for command, row in COMMANDS.items() if row.examples and command != "optimize"}
+    quick |= {row.examples[0] for row in simulate.KINDS.values()}
     for command, example in EXAMPLES:
-        yield pytest.param(command, example, id=example, marks=[pytest.mark.slow] if command == "optimize" else [])
+        yield pytest.param(command, example, id=example, marks=[] if example in quick else [pytest.mark.slow])
 
 
 @pytest.mark.parametrize(("command", "example"), list(example_cases()))

@@ -19,6 +19,7 @@ from anim.maths import matrix, quaternion
 from anim.model import Pose, Scene, Skeleton, Skin
 from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
 from tests.anim.exchange.figures import Find, character, recorded
+from tests.files import mark_slow
 
 Skins: TypeAlias = list[tuple[int, Skin]]
 Rig: TypeAlias = tuple[Skeleton, Skins]
@@ -121,7 +122,7 @@ RIGS: list[Callable[[Rig], Rig]] = [
     under_a_scaled_armature,
 ]
 EACH = pytest.mark.parametrize("build", RIGS, ids=lambda build: build.__name__)
-WHO = pytest.mark.parametrize("name", ["biped", "Knight.glb"])
+WHO = pytest.mark.parametrize("name", mark_slow(["biped", "Knight.glb"]))
 
 
 def _placed(rig: Rig, scale: float) -> Skeleton:

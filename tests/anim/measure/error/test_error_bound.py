@@ -45,7 +45,9 @@ def scene_and_clip(request: pytest.FixtureRequest, asset: Find) -> tuple[Scene, 
     return reader.scene(document), clip_of(document, name)
 
 
-@pytest.mark.parametrize("change", mark_slow(["fewer keys", "noise", "one key", "late"], slow=["noise", "one key"]))
+@pytest.mark.parametrize(
+    "change", mark_slow(["fewer keys", "noise", "one key", "late"], slow=["noise", "one key", "late"])
+)
 def test_nothing_is_understated_and_little_is_overstated(scene_and_clip: tuple[Scene, Clip], change: str) -> None:
     scene, before = scene_and_clip
     after = CHANGES[change](before)

@@ -12,7 +12,7 @@ from anim.model.vertex_cache import VertexCache, from_arrays
 from anim.show.filmstrip import clips
 from anim.show.filmstrip.clips import FrameSelection
 from anim.show.filmstrip.ground import ground_height
-from tests.files import opened_path
+from tests.files import mark_slow, opened_path
 
 # A foot, a head and the tip of a sword that is held level at rest and points at the ground later.
 REST = np.array([[0, 0, 0], [0, 1.8, 0], [0.9, 1, 0.0]])
@@ -50,7 +50,9 @@ def test_a_cache_without_a_rest_pose_begins_with_its_first_frame() -> None:
     assert ground_height(_cache(_raised(0.6), pointing, rest=False)) == pytest.approx(0.6)
 
 
-@pytest.mark.parametrize("clip", ["Death_A", "Lie_Idle", "Sit_Floor_Idle", "Running_A"])
+@pytest.mark.parametrize(
+    "clip", mark_slow(["Death_A", "Lie_Idle", "Sit_Floor_Idle", "Running_A"], slow=["Lie_Idle", "Sit_Floor_Idle"])
+)
 def test_knight_stands_at_0_while_its_weapons_are_lower(asset: Callable[[str], Path], clip: str) -> None:
     document = opened_path(asset("Knight.glb"))
     number = [each["name"] for each in document.json["animations"]].index(clip)

@@ -17,6 +17,7 @@ from tests.anim.simulation.cloth.cases import (
     sheet,
     simulate,
 )
+from tests.files import mark_slow
 
 
 def test_a_mass_spring_cloth_beyond_its_limit_is_an_error_with_advice() -> None:
@@ -42,7 +43,10 @@ def test_integrators_agree_at_small_steps(integrator: str) -> None:
     assert np.abs(found - expected).max() < 0.01
 
 
-@pytest.mark.parametrize("name", ["symplectic-euler", "velocity-verlet", "rk4", "implicit-euler"])
+@pytest.mark.parametrize(
+    "name",
+    mark_slow(["symplectic-euler", "velocity-verlet", "rk4", "implicit-euler"], ["velocity-verlet", "implicit-euler"]),
+)
 def test_the_mass_spring_cloth_converges_with_the_order_of_its_integrator(name: str) -> None:
     """Undamped, so that forces depend on positions alone; against RK4 with an eighth of the step."""
     positions, faces = sheet(5, 5)

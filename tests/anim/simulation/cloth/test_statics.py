@@ -14,6 +14,7 @@ from tests.anim.simulation.cloth.cases import (
     sheet,
     simulate,
 )
+from tests.files import mark_slow
 
 
 @pytest.mark.parametrize("substeps", [1, 4, 16])
@@ -23,7 +24,7 @@ def test_static_elongation_is_weight_times_compliance_at_any_step(substeps: int)
     assert one_edge(0.0, substeps, iterations=5) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("solver", ["xpbd", "relaxation"])
+@pytest.mark.parametrize("solver", mark_slow(["xpbd", "relaxation"], slow=["relaxation"]))
 def test_a_narrow_strip_hangs_as_a_catenary(solver: str) -> None:
     """A strip of 1 m whose ends are 0.8 m apart, folded up and down at the start."""
     positions, faces = sheet(2, 81, width=0.02)

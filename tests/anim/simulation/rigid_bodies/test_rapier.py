@@ -15,6 +15,7 @@ from anim.simulation.rigid_bodies.rapier.materials import MaterialPairs
 from anim.simulation.rigid_bodies.rapier.slip import ColliderPair, SlipReader, Velocity
 from tests.anim.simulation.rigid_bodies.cases import body, box_pile, ground, needs_rapier, run
 from tests.cli.running import ROOT
+from tests.files import mark_slow
 from tests.test_layers import MODULES, _imported
 
 FOLDER = ROOT / "anim" / "simulation" / "rigid_bodies" / "rapier"
@@ -41,7 +42,7 @@ def test_one_module_imports_the_package_and_one_is_its_interface() -> None:
 
 
 @needs_rapier
-@pytest.mark.parametrize("static", ["0.5", "0.8"])
+@pytest.mark.parametrize("static", mark_slow(["0.5", "0.8"], slow=["0.5"]))
 def test_threads_and_processes_change_no_number(static: str) -> None:
     found = set()
     for threads in ("1", "2", "5", "2"):

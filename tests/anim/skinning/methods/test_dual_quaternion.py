@@ -17,7 +17,7 @@ from fixtures.tube import TUBE_RINGS, TUBE_SIDES
 from tests.anim.skinning.methods.test_linear_blend import TIMES, baked, moving
 from tests.anim.skinning.scenes import mesh, random_scene, scene, skinning_matrices
 from tests.clips import about, clip, track
-from tests.files import opened_fixture
+from tests.files import mark_slow, opened_fixture
 
 TURNING = [name for name in SKINNING_METHODS if name != "lbs"]
 
@@ -147,7 +147,7 @@ def test_a_twisted_ring(angle: float) -> None:
 
 @pytest.mark.parametrize(("name", "fraction"), [("tube", 1.0), ("tube_f03", 0.3)])
 @pytest.mark.parametrize(("axis", "loss"), [("y", 2 / 3), ("x", 1 / 3)])
-@pytest.mark.parametrize("angle", [45.0, 90.0, 135.0])
+@pytest.mark.parametrize("angle", mark_slow([45.0, 90.0, 135.0], slow=[45.0, 135.0]))
 def test_the_volume_of_the_tube(name: str, fraction: float, axis: str, loss: float, angle: float) -> None:
     """1 − ⅔ f sin²(θ/2) twisted and 1 − ⅓ f sin²(θ/2) bent under lbs, 1 under dqs, within 1e-3."""
     of = reader.scene(opened_fixture(name))
