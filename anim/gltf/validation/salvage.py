@@ -89,9 +89,10 @@ class _Remaining:
                     self._accessor(i)
         elif kind == "accessors":
             self.json.pop("meshes", None)
-            self.json["nodes"] = [_drop_items(node, "mesh") for node in self.json.get("nodes", [])]
-            self.json["skins"] = [_drop_items(skin, "inverseBindMatrices") for skin in self.json.get("skins", [])]
-            for i in range(len(self.json.get("animations", []))):
+            for name, key in (("nodes", "mesh"), ("skins", "inverseBindMatrices")):
+                if type(items := self.json.get(name, [])) is list:
+                    self.json[name] = [_drop_items(item, key) for item in items]
+            for i in range(len(_objects(self.json, "animations"))):
                 self._animation(i, "", None)
 
     def _put(self, kind: str, number: int, value: Json) -> None:
@@ -163,7 +164,8 @@ class _Remaining:
 
 def _objects(json: Json, kind: str) -> list[Json]:
     """The objects of an array; empty if it is not an array."""
-    return [each if type(each) is dict else {} for each in json_array(json, kind)]
+    found = json.get(kind)
+    return [each if type(each) is dict else {} for each in found] if type(found) is list else []
 
 
 def _list(value: Json, key: str) -> list[Json]:
