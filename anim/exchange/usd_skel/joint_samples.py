@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats
+from anim.arrays import AnyArray, Bools, Floats
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup
 from anim.maths import matrix, quaternion
 from anim.model import Pose
@@ -43,7 +43,8 @@ def constant_scales(group: SkeletonGroup, pose: Pose) -> Floats:
     """Return the product (J,) of constant uniform scales of each joint and those above it that are not animated.
 
     Those are in the bind transforms, which then have one scale in common: Blender's bones have none. A joint with
-    vertices that has another scale in its clip than at bind time keeps the quotient in its animation.
+    vertices that has another scale in its clip than at bind time, or an animated one, keeps the quotient in its
+    animation.
     """
     own = np.full(len(group.joints), np.nan)
     for i, node in enumerate(group.joints):
@@ -52,13 +53,21 @@ def constant_scales(group: SkeletonGroup, pose: Pose) -> Floats:
             own[i] = scale[0, 0]
     whole, bind = _products(group, np.nan_to_num(own, nan=1.0)), group.bind_scales()
     is_bound = np.isfinite(bind)
-    wanted = bind / np.median((bind / np.abs(whole))[is_bound]) if is_bound.any() else bind
+    wanted = bind / _common_scale((bind / np.abs(whole))[is_bound], np.isfinite(own)[is_bound])
     found = np.ones(len(group.joints))
     for i, parent in enumerate(group.parents.tolist()):
         found[i] = found[parent] if parent >= 0 else 1.0
         if np.isfinite(own[i]):
             found[i] *= own[i] / _stored_scale(abs(found[i] * own[i]) / wanted[i])
+        elif is_bound[i] and _is_stored(np.abs(pose.scale[:, group.joints[i]]).max() * found[i] / wanted[i]):
+            found[i] = wanted[i]
     return found
+
+
+def _common_scale(ratios: Floats, is_constant: Bools) -> float:
+    """The lower median of the ratios (B,) of bound joints, of constant ones if there are any; 1 for none."""
+    used = np.sort(ratios[is_constant] if is_constant.any() else ratios)
+    return float(used[(len(used) - 1) // 2]) if len(used) else 1.0
 
 
 def _products(group: SkeletonGroup, own: Floats) -> Floats:
@@ -71,9 +80,14 @@ def _products(group: SkeletonGroup, own: Floats) -> Floats:
 
 def _stored_scale(ratio: float) -> float:
     """The scale for the animation near `ratio` that float16 stores: 1 if it is within its rounding, or unknown."""
-    if not MIN_STORED_SCALE < ratio < 1 / MIN_STORED_SCALE or abs(ratio - 1) < FLOAT16_ROUNDING:
+    if not _is_stored(ratio) or abs(ratio - 1) < FLOAT16_ROUNDING:
         return 1.0
     return float(np.float16(ratio))
+
+
+def _is_stored(ratio: float) -> bool:
+    """Whether float16 has enough digits for a scale."""
+    return MIN_STORED_SCALE < ratio < 1 / MIN_STORED_SCALE
 
 
 def scale_remainders(group: SkeletonGroup, pose: Pose, constant: Floats) -> Floats:

@@ -34,6 +34,7 @@ CASES: dict[str, dict[str, Any]] = {
     "100, at bind time too": {"scale": 100.0, "at_bind": True, "in_skin": True},
     "animated": {"scale": 1.0, "scales": (1.0, 2.0, 0.5)},
     "a joint's own": {"scale": 2.0, "joint": 1.5},
+    "a joint's own, animated, and at bind time": {"scale": 1.0, "scales": (0.5, 1.0, 0.25), "joint_at_bind": 0.5},
 }
 
 
@@ -44,8 +45,12 @@ def _wrapped(
     at_bind: bool = False,
     scales: tuple[float, ...] = (),
     joint: float = 1.0,
+    joint_at_bind: float = 1.0,
 ) -> tuple[Document, Scene, Clip]:
-    """A figure below a node with a scale, which moves and rotates; joint: scale of a joint in the clip."""
+    """A figure below a node with a scale, which moves and rotates; joint: scale of a joint in the clip.
+
+    scales: of the node; of the joint if that has another scale at bind time.
+    """
     document = opened_fixture("arm")
     scene, clip = reader.scene(document, normals=True), reader.clips(document)[0]
     bare = with_root(scene.skeleton, "wrap")
@@ -57,14 +62,17 @@ def _wrapped(
         Track(top, "translation", "LINEAR", TIMES, np.array([[0, 0, 0], [1, 0, 0.5], [0, 1, 0]]) * size),
         Track(top, "rotation", "LINEAR", TIMES, about("y", [0, 70, 20])),
     ]
+    (skin,) = {instance.skin for instance in scene.instances if instance.skin is not None}
     if scales:
-        tracks.append(Track(top, "scale", "LINEAR", TIMES, np.tile(scales, (3, 1)).T))
+        scaled = top if joint_at_bind == 1 else int(skin.joints[1])
+        tracks.append(Track(scaled, "scale", "LINEAR", TIMES, np.tile(scales, (3, 1)).T))
     if joint != 1:
-        (skin,) = {instance.skin for instance in scene.instances if instance.skin is not None}
         tracks.append(Track(int(skin.joints[1]), "scale", "LINEAR", TIMES, np.full((3, 3), joint)))
     targets = {track.target for track in tracks}
     kept = (track for track in clip.tracks if track.target not in targets)
     instances = tuple(_rebound(each, top, scale, in_skin=in_skin, at_bind=at_bind) for each in scene.instances)
+    if joint_at_bind != 1:
+        instances = tuple(_scaled_joint(each, joint_at_bind) for each in instances)
     return (
         document,
         Scene(replace(bare, parents=parents, scale=sizes), instances),
@@ -81,6 +89,14 @@ def _rebound(instance: MeshInstance, top: int, scale: float, *, in_skin: bool, a
     if at_bind:
         binds = np.concatenate((binds[..., :3] / scale, binds[..., 3:] / scale), axis=-1)
     return replace(instance, skin=Skin(joints, binds))
+
+
+def _scaled_joint(instance: MeshInstance, scale: float) -> MeshInstance:
+    if instance.skin is None:
+        return instance
+    binds = instance.skin.inverse_bind.copy()
+    binds[1] /= scale
+    return replace(instance, skin=Skin(instance.skin.joints, binds))
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
