@@ -86,7 +86,7 @@ def _stored_scale(ratio: float) -> float:
 
 
 def _is_stored(ratio: float) -> bool:
-    """Whether float16 has enough digits for a scale."""
+    """Return True for a scale that float16 stores with all of its digits."""
     return MIN_STORED_SCALE < ratio < 1 / MIN_STORED_SCALE
 
 
