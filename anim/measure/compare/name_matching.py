@@ -83,8 +83,9 @@ def match_by_name_then_order(old: Sequence[str], new: Sequence[str]) -> Ints:
 def match_nodes(old: Scene, new: Scene) -> Ints:
     """Return for each node of `old` (N,) its index in `new`, −1 without one.
 
-    By name, then by its letters and digits; then joints in order of skins of equal size; then in order among the
-    children of one parent, if one of both has no name or no name is common.
+    By name, where several have it by the names above them too; then by its letters and digits; then joints in order of
+    skins of equal size; then in order among the children of one parent, if one of both has no name or no name is
+    common.
     """
     return _Nodes(old.skeleton, new.skeleton).joined(_skins(old), _skins(new))
 
@@ -96,8 +97,22 @@ class _Nodes:
         self._old, self._new = old, new
         self._children = _children(old), _children(new)
         self.found = match_by_letters(old.names, new.names)
+        self._match_paths()
         self._taken = set(self.found[self.found >= 0].tolist())
         self._renamed = not (match_by_name(old.names, new.names) >= 0).any()
+
+    def _match_paths(self) -> None:
+        """Match nodes of repeated names by the names from the root on, where these are the same set in both files."""
+        paths: dict[tuple[int, str], int] = {}
+        before_counts, after_counts = Counter(self._old.names), Counter(self._new.names)
+        before = _by_name(self._old.names, _path_ids(self._old, paths))
+        after = _by_name(self._new.names, _path_ids(self._new, paths))
+        for name, nodes in before.items():
+            partners = after.get(name, {})
+            are_distinct = before_counts[name] == after_counts[name] == len(nodes)
+            if len(nodes) > 1 and are_distinct and nodes.keys() == partners.keys():
+                for path, node in nodes.items():
+                    self.found[node] = partners[path]
 
     def joined(self, old_skins: list[Ints], new_skins: list[Ints]) -> Ints:
         for one, other in zip(old_skins, new_skins, strict=False):
@@ -137,6 +152,29 @@ def _children(skeleton: Skeleton) -> dict[int, list[int]]:
     result: dict[int, list[int]] = {}
     for node, parent in enumerate(skeleton.parents.tolist()):
         result.setdefault(parent, []).append(node)
+    return result
+
+
+def _path_ids(skeleton: Skeleton, known: dict[tuple[int, str], int]) -> list[int]:
+    """Return for each node (N,) the index of its path, the names from the root on.
+
+    known: indices by the parent's index, −1 for none, and the name; added to.
+    """
+    found = [-1] * len(skeleton)
+    for level in skeleton.levels():
+        for node in level.tolist():
+            parent = int(skeleton.parents[node])
+            key = (found[parent] if parent >= 0 else -1, skeleton.names[node])
+            found[node] = known.setdefault(key, len(known))
+    return found
+
+
+def _by_name(names: Sequence[str], paths: Sequence[int]) -> dict[str, dict[int, int]]:
+    """Return nodes by name and path; nodes without a name are left out."""
+    result: dict[str, dict[int, int]] = defaultdict(dict)
+    for node, (name, path) in enumerate(zip(names, paths, strict=True)):
+        if name:
+            result[name][path] = node
     return result
 
 

@@ -40,6 +40,14 @@ def test_nodes_by_name_wherever_they_are() -> None:
     assert match_nodes(new, old).tolist() == [2, -1, 1, 0]
 
 
+def test_nodes_of_repeated_names_by_the_names_above_them() -> None:
+    old = Scene(_named(["hip", "foot.L", "foot", "foot"], [-1, 0, 0, 1]), ())
+    new = Scene(_named(["foot", "hip", "foot", "foot.L"], [3, -1, 1, 1]), ())
+    assert match_nodes(old, new).tolist() == [1, 3, 2, 0]
+    moved = Scene(_named(["foot", "hip", "foot", "foot.L"], [1, -1, 1, 1]), ())
+    assert match_nodes(old, moved).tolist() == [1, 3, 0, 2]
+
+
 def test_by_letters_where_a_tool_replaced_other_characters() -> None:
     assert match_by_letters(["hip", "Foot.L", "Foot.R"], ["Foot_R", "FootL", "hip"]).tolist() == [2, 1, 0]
     assert match_by_letters(["Foot.L", "Foot_L"], ["Foot_L", "FootL"]).tolist() == [1, 0]
