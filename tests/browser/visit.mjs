@@ -12,7 +12,7 @@ const READY_MS = 600000; // software GL under load takes minutes for some shader
 const READY = "document.documentElement.dataset.ready || document.documentElement.dataset.error || ''";
 // What a link to the page shows
 const STATE = `(({ clip, node, show, side, unit, speed, loop, heatScale }) => JSON.stringify(
-  [clip, node, [...show].sort(), side, unit, speed, loop, heatScale.toPrecision(6)]))(player.state)`;
+  [clip, node, [...show].sort(), side, unit, speed, loop, heatScale.toPrecision(6), player.stage.cameraText]))(player.state)`;
 const PIN = `(() => {
   const spot = player.stage.project(player.worst().point, player.sides[1]);
   const [x, y] = document.querySelector("#pin").style.transform.match(/-?[\\d.]+/g).map(Number);
@@ -83,6 +83,9 @@ async function tryDesktop(file, faults) {
     await press("Home");
     await press(" ");
     await until(page, "player.state.time > 0");
+    await press("o");
+    await until(page, `location.hash.includes("onion")`); // during playback
+    await press("o");
     await press(" ");
     expect(!(await get("player.state.playing")), "pauses");
     await page.click("#scrub input"); // its center
@@ -166,6 +169,9 @@ async function tryDesktop(file, faults) {
       player.follow(link);
       return {clip: link.clip, time: link.time, error: player.worst().error};
     }))(JSON.parse(document.getElementById("facts").textContent))`);
+  expect(!(await get("player.stage.cameraText")), "the address has no camera before it moves");
+  await get("(player.stage.camera.position.multiplyScalar(1.2), player.stage.controls.update(), true)");
+  expect(await get("player.stage.cameraText.split(',').length === 6"), "the address has the camera");
   await until(page, "location.hash === player.address()");
   const hash = await get("location.hash");
   const [shown, time] = [await get(STATE), await get("player.state.time")];

@@ -54,7 +54,8 @@ function render(player, changed) {
   if (has("heatScale")) $("#heat-most").textContent = formatLength(state.heatScale);
   if (has("speed")) $("#speed").value = String(state.speed);
   if (has("loop")) $("#loop").value = state.loop;
-  if (!state.playing) writeHash(() => hashOf(player));
+  const isMore = [...changed].some((name) => name !== "time" && name !== "direction");
+  if (isMore || !state.playing) writeHash(() => hashOf(player)); // the time of playback when it ends
 }
 
 function hashOf(player) {
@@ -72,6 +73,7 @@ function hashOf(player) {
     speed: state.speed === 1 ? null : state.speed,
     loop: state.loop === "loop" ? null : state.loop,
     scale: state.heatScale === player.ownHeatScale ? null : state.heatScale,
+    camera: player.stage.cameraText,
   };
 }
 
@@ -88,6 +90,7 @@ function connect(player) {
   $("#loop").addEventListener("change", (event) => update({ loop: event.target.value }));
   for (const name of SHOWS) $(`#show-${name}`).addEventListener("click", () => toggleShow(name));
   for (const name of SIDES) $(`#side-${name}`).addEventListener("click", () => update({ side: name }));
+  player.stage.controls.addEventListener("change", () => writeHash(() => hashOf(player)));
   let down = null;
   const canvas = $("#view canvas");
   canvas.addEventListener("pointerdown", (event) => (down = event));
@@ -129,6 +132,7 @@ function begin(player) {
   update({ theme, unit, speed, loop, tab, sort: asked.sort, side: asked.side });
   if (side.clips.length) player.chooseClip(Math.max(clip, 0), asked.time ?? 0);
   fit(player);
+  if (asked.camera) player.stage.moveCamera(asked.camera);
   player.resetHeatScale();
   if (asked.scale) update({ heatScale: asked.scale });
   update({ node: node?.index ?? null, show: asked.show });

@@ -9,6 +9,8 @@ const FIT_TIMES = 5; // of the clip
 const MAX_FIT_VERTICES = 400; // per mesh and time
 const FILLED = 0.8; // of the view's height or width, by the model
 const MAX_PIXEL_RATIO = 2;
+const CAMERA_DIGITS = 3; // of the camera in the address, below the radius of the model
+const MAX_DECIMALS = 12;
 const FLOOR_RADII = 6; // radius of the floor, in radii of the model
 const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from the front, a little from the left and above
 
@@ -29,6 +31,7 @@ export class Stage {
     });
     this.radius = 1;
     this.cell = 1;
+    this.framed = ""; // camera that frames everything, as text
   }
 
   get shown() {
@@ -50,12 +53,34 @@ export class Stage {
     this.controls.target.copy(center);
     this.controls.maxDistance = distance * 10;
     this.controls.update();
+    this.framed = this.#camera;
     this.cell = roundDown(this.radius / 2);
     for (const mesh of this.floors) {
       mesh.scale.setScalar(this.radius * FLOOR_RADII);
       mesh.position.set(center.x, box.min.y, center.z);
       mesh.material.uniforms.cell.value = this.cell;
     }
+  }
+
+  /** Position and target of the camera for the address: "x,y,z,x,y,z"; "" while it frames everything. */
+  get cameraText() {
+    return this.#camera === this.framed ? "" : this.#camera;
+  }
+
+  get #camera() {
+    const decimals = Math.max(0, Math.min(CAMERA_DIGITS - Math.floor(Math.log10(this.radius)), MAX_DECIMALS));
+    const parts = [...this.camera.position.toArray(), ...this.controls.target.toArray()];
+    return parts.map((part) => String(Number(part.toFixed(decimals)))).join(",");
+  }
+
+  /** Put the camera where `cameraText` says; text that names no camera changes nothing. */
+  moveCamera(text) {
+    const parts = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
+    const [position, target] = [new Vector3(...parts.slice(0, 3)), new Vector3(...parts.slice(3))];
+    if (parts.length !== 6 || !parts.every(Number.isFinite) || position.equals(target)) return;
+    this.camera.position.copy(position);
+    this.controls.target.copy(target);
+    this.controls.update();
   }
 
   /** Positions of some vertices of all files, at some times; of nodes where there is no mesh. */

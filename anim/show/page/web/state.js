@@ -66,6 +66,7 @@ export function readHash(defaults) {
     scale: number("scale"),
     tab: pick("list"),
     sort: pick("sort") ?? "",
+    camera: pick("camera"),
   };
 }
 
