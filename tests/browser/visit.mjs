@@ -200,6 +200,10 @@ async function tryPhone(file, faults) {
   const expect = (isTrue, fault) => isTrue || faults.push(`phone: ${fault}`);
   const get = page.run;
   expect(!(await get("player.state.playing")), "moves under reduced motion");
+  expect(await get("document.documentElement.scrollWidth <= innerWidth"), "scrolls sideways");
+  if (await get(`document.querySelector("#pin").checkVisibility()`)) {
+    expect(await get(`document.querySelector("#pin b").getBoundingClientRect().right <= innerWidth`), "the error is cut off");
+  }
   await page.click("#menu");
   const clips = await get(`document.querySelectorAll("[data-clip]").length`);
   if (clips) {

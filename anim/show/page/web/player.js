@@ -16,6 +16,7 @@ import { Timeline } from "./timeline.js";
 const KEY_TOLERANCE_S = 1e-5;
 const MAX_TICK_S = 0.1; // of the clock between two pictures, after the tab was hidden
 const MAX_PICK_PX = 18;
+const PIN_LABEL_PX = 15; // from the ring's center to its label
 const HEAT_PER_DIAGONAL = 0.01; // scale of heat where no error is known
 
 /** The files of the page, what is shown of them, and time. */
@@ -165,7 +166,9 @@ export class Player {
     pin.hidden = !spot;
     if (!spot) return;
     pin.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
-    pin.firstElementChild.textContent = formatLength(worst.error);
+    const label = pin.firstElementChild;
+    label.textContent = formatLength(worst.error);
+    pin.classList.toggle("at-edge", spot.x + PIN_LABEL_PX + label.offsetWidth > pin.parentNode.clientWidth);
   }
 
   /** The chosen node of A in a side: the same one, or that of the same name. */
