@@ -149,6 +149,10 @@ async function tryDesktop(file, faults) {
     await page.click("#tab-nodes");
     await page.click("[data-node]");
     expect((await get("player.state.node")) !== null, "chooses a node");
+    await press("f");
+    expect((await get("player.framed")) === (await get("player.state.node")), "F frames the node");
+    await press("f");
+    expect((await get("player.framed")) === null, "F again frames everything");
     expect(await get("document.activeElement === document.body"), "the space bar plays after a click in a list");
   }
   if (await get("player.sides.length > 1")) {

@@ -33,7 +33,7 @@ export function bindings(player) {
     },
     { keys: ["-", "+"], label: "slower, faster", run: (event) => changeSpeed(event.key === "-" ? -1 : 1) },
     { keys: ["l"], label: "loop, once, ping-pong", run: () => cycle("loop", LOOPS) },
-    { keys: ["f"], label: "frame everything", run: () => fit(player) },
+    { keys: ["f"], label: "frame the chosen node; again: everything", run: () => frame(player) },
     { keys: ["s"], label: "skeleton", run: () => toggleShow("bones") },
     { keys: ["w"], label: "wireframe", run: () => toggleShow("wire") },
     { keys: ["o"], label: "onion skins", run: () => toggleShow("onion") },
@@ -64,8 +64,15 @@ function changeSpeed(direction) {
   if (SPEEDS[next]) update({ speed: SPEEDS[next] });
 }
 
+/** Frame the chosen node; everything where none is chosen, or where F framed it before. */
+export function frame(player) {
+  if (state.node === null || player.framed === state.node) return fit(player);
+  player.frameNode();
+}
+
 /** Frame everything. */
 export function fit(player) {
+  player.framed = null;
   player.stage.fit(player.duration);
   $("#floor").textContent = player.stage.floorLabel;
   player.isDirty = true;

@@ -2,7 +2,7 @@
 
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
-import { bindings, fit, isDark } from "./bindings.js";
+import { bindings, fit, frame, isDark } from "./bindings.js";
 import { markClip, sortClips } from "./clips.js";
 import { facts, readFile } from "./data.js";
 import { $, setPressed } from "./dom.js";
@@ -82,7 +82,7 @@ function connect(player) {
   listenToKeys(bindings(player));
   $("#play").addEventListener("click", () => player.play());
   $("#help").addEventListener("click", openSheet);
-  $("#fit").addEventListener("click", () => fit(player));
+  $("#fit").addEventListener("click", () => frame(player));
   $("#theme").addEventListener("click", () => update({ theme: isDark() ? "light" : "dark" }));
   $("#menu").addEventListener("click", () => document.body.classList.toggle("with-side"));
   for (const name of UNITS) $(`#unit-${name}`).addEventListener("click", () => update({ unit: name }));

@@ -34,6 +34,7 @@ export class Player {
     this.isDirty = true;
     this.last = 0;
     this.frames = 0; // animation frames so far
+    this.framed = null; // index of the node that F framed
     this.stage.controls.addEventListener("change", () => (this.isDirty = true));
   }
 
@@ -176,6 +177,17 @@ export class Player {
     if (state.node === null || side === this.sides[0]) return state.node;
     const name = this.sides[0].nodes.get(state.node)?.name;
     return [...side.nodes.values()].find((node) => node.name === name)?.index ?? null;
+  }
+
+  /** Aim the camera at the chosen node, where the shown file has it. */
+  frameNode() {
+    const [side] = this.stage.shown;
+    const node = side.nodes.get(this.#nodeIn(side));
+    if (!node) return;
+    side.pose(state.time);
+    this.stage.frame(side, node);
+    this.framed = state.node;
+    this.isDirty = true;
   }
 
   #drawCurves() {

@@ -8,6 +8,7 @@ import { state } from "./state.js";
 const FIT_TIMES = 5; // of the clip
 const MAX_FIT_VERTICES = 400; // per mesh and time
 const FILLED = 0.8; // of the view's height or width, by the model
+const MIN_FRAME_PER_RADIUS = 0.15; // radius around a framed node, in radii of the model
 const MAX_PIXEL_RATIO = 2;
 const CAMERA_DIGITS = 3; // of the camera in the address, below the radius of the model
 const MAX_DECIMALS = 12;
@@ -60,6 +61,22 @@ export class Stage {
       mesh.position.set(center.x, box.min.y, center.z);
       mesh.material.uniforms.cell.value = this.cell;
     }
+  }
+
+  /** Aim the camera from its present direction at a node of a posed file: its children and its own meshes. */
+  frame(side, node) {
+    const nodes = [...side.nodes.values()].filter((each) => each === node || each.parent === node.index);
+    const points = nodes.map((each) => new Vector3().setFromMatrixPosition(each.object.matrixWorld));
+    for (const mesh of side.meshes) if (side.owners.get(mesh) === node.index) addVertices(points, mesh);
+    const box = new Box3().setFromPoints(points);
+    const radius = Math.max(box.getSize(new Vector3()).length() / 2, this.radius * MIN_FRAME_PER_RADIUS);
+    const { clientWidth, clientHeight } = this.renderer.domElement.parentNode;
+    const aspect = Math.min(1, clientWidth / clientHeight / this.shown.length);
+    const distance = radius / (Math.tan((this.camera.fov * Math.PI) / 360) * FILLED * aspect);
+    const offset = this.camera.position.clone().sub(this.controls.target).setLength(distance);
+    box.getCenter(this.controls.target);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
   }
 
   /** Position and target of the camera for the address: "x,y,z,x,y,z"; "" while it frames everything. */
