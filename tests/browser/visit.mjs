@@ -117,6 +117,7 @@ async function tryDesktop(file, faults) {
     expect((await get(`${shown}.length`)) === listed, "Escape ends the filter");
     await press("Escape");
     await get(`player.update({ sort: "duration" })`);
+    expect((await get(`document.querySelector("#list-clips").scrollTop`)) === 0, "a sorted list begins at its top");
     const lengths = await get(`${shown}.map((row) => player.sides[0].clips[row.dataset.clip].duration)`);
     expect(lengths.every((length, i) => !i || length <= lengths[i - 1]), "clips by duration");
     await get(`(player.update({ sort: "" }), player.chooseClip(${first}), true)`);

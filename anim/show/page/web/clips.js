@@ -60,6 +60,7 @@ export function sortClips(side, facts) {
   const list = sort.closest("[role=tabpanel]");
   const rows = new Map([...list.querySelectorAll("[data-clip]")].map((row) => [Number(row.dataset.clip), row]));
   list.append(...orders.get(name).map((i) => rows.get(i)));
+  list.scrollTop = 0;
 }
 
 export function markClip(index) {

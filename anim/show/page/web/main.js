@@ -50,7 +50,7 @@ function render(player, changed) {
   if (has("unit")) for (const name of UNITS) setPressed($(`#unit-${name}`), state.unit === name);
   if (has("tab")) markTab(state.tab);
   if (has("sort")) sortClips(player.sides[0], facts);
-  if (has("clip", "node", "tab", "sort")) scrollToChosen();
+  if (has("clip", "node", "tab")) scrollToChosen();
   if (has("heatScale")) $("#heat-most").textContent = formatLength(state.heatScale);
   if (has("speed")) $("#speed").value = String(state.speed);
   if (has("loop")) $("#loop").value = state.loop;
