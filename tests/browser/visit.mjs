@@ -209,6 +209,9 @@ async function tryPhone(file, faults) {
   if (await get(`document.querySelector("#pin").checkVisibility()`)) {
     expect(await get(`document.querySelector("#pin b").getBoundingClientRect().right <= innerWidth`), "the error is cut off");
   }
+  if (await get(`player.sides.length > 1 && document.querySelector("#list-report [data-link]") !== null`)) {
+    expect(await get(`document.querySelector("#list-report [aria-current]") !== null`), "marks the error that it shows");
+  }
   await page.click("#menu");
   const clips = await get(`document.querySelectorAll("[data-clip]").length`);
   if (clips) {

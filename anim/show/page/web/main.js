@@ -10,7 +10,7 @@ import { formatLength } from "./format.js";
 import { GRADIENT } from "./heat.js";
 import { listenToKeys, openSheet } from "./keyboard.js";
 import { Player } from "./player.js";
-import { fillSidebar, markNode, markTab, scrollToChosen } from "./sidebar.js";
+import { fillSidebar, markLink, markNode, markTab, scrollToChosen } from "./sidebar.js";
 import { Side } from "./side.js";
 import { SHOWS, SIDES, UNITS, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
 
@@ -139,6 +139,7 @@ function begin(player) {
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   update({ playing: side.clips.length > 0 && asked.time === null && !isCalm });
   render(player, new Set(Object.keys(state)));
+  if (!state.playing) markLink(state.clip, state.time);
 }
 
 async function main() {

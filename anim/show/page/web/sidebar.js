@@ -8,6 +8,9 @@ import { state, update } from "./state.js";
 
 const INDENT_PX = 11;
 const MAX_INDENT = 10;
+const LINK_TOLERANCE_S = 1e-3; // of times in the address
+
+const links = new Map(); // of rows of panels, in their order
 
 /** Fill the sidebar, and return the name of the list that matters most. actions: {chooseClip, chooseNode, follow}. */
 export function fillSidebar(sides, facts, actions) {
@@ -36,6 +39,12 @@ export function fillSidebar(sides, facts, actions) {
   $("#side").append(bar, ...bodies);
   $("#side").addEventListener("keydown", moveRow);
   return panels.length || sides[0].clips.length ? lists[0][0] : "nodes";
+}
+
+/** Mark the first row that links to a clip and time of the first file, where the page begins. */
+export function markLink(clip, time) {
+  const isThere = (link) => link.clip === clip && link.time !== null && Math.abs(link.time - time) < LINK_TOLERANCE_S;
+  [...links].find(([, link]) => isThere(link))?.[0].setAttribute("aria-current", "true");
 }
 
 export function markTab(name) {
@@ -120,6 +129,7 @@ function panelSection(panel, { follow }) {
     const row = link
       ? make("button", { ...attributes, "data-link": "", onclick: (event) => followRow(event.currentTarget, link) }, ...columns)
       : make("div", attributes, ...columns);
+    if (link) links.set(row, link);
     return [row, parts.length ? partList(parts, followRow) : null];
   });
   const about = panel.about ? make("p", { class: "about" }, panel.about) : null;
