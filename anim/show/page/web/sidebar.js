@@ -119,6 +119,7 @@ function panelSection(panel, { follow }) {
     const [name, ...others] = cells;
     const columns = [
       make("span", { class: "name" }, name),
+      level ? make("span", { class: "level dim" }, level) : null,
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
       text ? make("span", { class: "text" }, text) : null,
       advice ? make("span", { class: "text dim" }, ...unbroken(advice)) : null,
