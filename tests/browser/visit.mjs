@@ -63,6 +63,7 @@ async function tryDesktop(file, faults) {
   const error = await get("document.documentElement.dataset.error ?? ''");
   if (/WebGL/.test(error)) await browser.close().then(() => leave(error));
   expect(!error, `does not load: ${error}`);
+  expect(await get(`document.querySelector("#loading").hidden`), "says that it loads, though it is shown");
   const duration = await get("player.duration");
   const clips = await get("player.sides[0].clips.length");
   if (clips) {

@@ -159,6 +159,7 @@ async function main() {
   connect(player);
   begin(player);
   player.draw();
+  $("#loading").hidden = true;
   requestAnimationFrame((now) => player.tick(now));
   const address = () => hashText(hashOf(player));
   globalThis.player = Object.assign(player, { state, update, address }); // for scripts and tests
@@ -169,4 +170,5 @@ main().catch((error) => {
   document.documentElement.dataset.error = String(error);
   $("#message").textContent = `This file can't be shown: ${error.message ?? error}`;
   $("#message").hidden = false;
+  $("#loading").hidden = true;
 });
