@@ -23,6 +23,22 @@ const AXES = `(() => {
   const [one, other] = ["#curves canvas", "#scrub canvas"].map((each) => document.querySelector(each).getBoundingClientRect());
   return document.querySelector("footer").checkVisibility() ? one.left === other.left && one.right === other.right : true;
 })()`;
+// An animated node whose curves are the same in both files, as the panel of curves states
+const EQUAL = `(() => {
+  const [a, b] = player.sides;
+  const isSame = ([node, tracks]) => tracks.every(({ path }) => path !== "weights") &&
+    [...b.nodes.values()].find(({ name }) => name === a.nodes.get(node).name)?.index === node;
+  const [node] = [...a.tracks].find(isSame) ?? [null];
+  const [chosen, own] = [player.state.node, b.tracks];
+  if (node === null || !player.isPaired) return true;
+  b.tracks = a.tracks;
+  player.update({ node: null });
+  player.update({ node });
+  const isNamed = !document.querySelector("#curves-equal").hidden;
+  b.tracks = own;
+  player.update({ node: chosen });
+  return isNamed;
+})()`;
 const NO_ENGINE = 3; // exit code
 const browser = await launch(engine, { library, executable }).catch((error) => leave(error.stack ?? error));
 
@@ -165,6 +181,7 @@ async function tryDesktop(file, faults) {
       expect((await get("player.state.side")) === side, `side ${side}`);
     }
     expect(await get(PIN), "the ring is on the worst vertex");
+    expect(await get(EQUAL), "names the parents of a node with equal curves");
     const scale = await get("player.state.heatScale");
     await press("]");
     expect((await get("player.state.heatScale")) === 2 * scale, "scale of heat");

@@ -14,6 +14,7 @@ const FOOT = 8; // px below it
 const MIN_LABEL_PX = 20; // between labels of values
 const MIN_RANGE_PER_VALUE = 1e-3; // of a graph; less is rounding
 const MIN_RANGE_DEGREES = 1;
+const EQUAL_PER_VALUE = 1e-5; // of the largest value of a track: rounding in float32
 const COLORS = ["--x", "--y", "--z", "--w"];
 const AXES = ["x", "y", "z", "w"];
 const PATH_UNITS = { translation: "m", rotation: "", scale: "×", weights: "" };
@@ -124,6 +125,19 @@ function drawValues(context, { values, size, unit, y, axis }) {
     context.fillText(`${Number((value * factor).toPrecision(6))}${UNIT_TEXTS[name] ?? ` ${name}`}`, axis.left - 8, y(value) + 4);
   }
   context.textAlign = "left";
+}
+
+/** Whether tracks of a node in both files, [{path, track}], have the same values; rest: rotation that both begin at. */
+export function areEqual(one, other, rest, duration) {
+  if (!one.length || one.length !== other.length) return false;
+  const times = Array.from({ length: SAMPLES + 1 }, (_, i) => (duration * i) / SAMPLES);
+  return one.every((each) => {
+    const partner = other.find(({ path }) => path === each.path);
+    if (!partner || each.path === "weights") return false; // whose meshes no parent deforms
+    const [mine, its] = [each, partner].map((track) => times.map(graph(track, rest, "degrees").at).flat());
+    const tolerance = EQUAL_PER_VALUE * Math.max(...mine.map(Math.abs));
+    return mine.length === its.length && mine.every((value, i) => Math.abs(value - its[i]) <= tolerance);
+  });
 }
 
 function drawKeys(context, { times, size, at, tangents, which }, x, y) {

@@ -26,6 +26,7 @@ function render(player, changed) {
   }
   if (has("clip", "node")) {
     markNode(state.node, new Set(player.sides[0].tracks?.keys() ?? []));
+    player.compareCurves();
     player.drawTimeline();
   }
   if (has("theme")) {

@@ -2,7 +2,7 @@
 
 import { Vector3 } from "three";
 import { Bones } from "./bones.js";
-import { Curves } from "./curves.js";
+import { Curves, areEqual } from "./curves.js";
 import { facts } from "./data.js";
 import { $ } from "./dom.js";
 import { formatLength, roundUp } from "./format.js";
@@ -188,6 +188,16 @@ export class Player {
     this.stage.frame(side, node);
     this.framed = state.node;
     this.isDirty = true;
+  }
+
+  /** Name the parents where the chosen node has the same curves in both files. */
+  compareCurves() {
+    const [a, b] = this.sides;
+    const index = state.node === null || !this.isPaired ? null : this.#nodeIn(b ?? a);
+    const isBoth = Boolean(b) && index !== null;
+    const tracks = isBoth ? [a.tracks?.get(state.node) ?? [], b.tracks?.get(index) ?? []] : [[], []];
+    const rest = a.nodes.get(state.node)?.rest.quaternion;
+    $("#curves-equal").hidden = !areEqual(...tracks, rest, this.duration);
   }
 
   #drawCurves() {
