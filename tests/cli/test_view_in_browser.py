@@ -34,9 +34,11 @@ def test_every_key_of_two_files_and_names_with_markup(fixture: Fixture, call: Ca
     one.write_bytes(renamed(built("biped"), [MARKUP, "wave"]))
     call("optimize", one, small, "--max-error", "3%", "--effort", "fast")
     call("view", one, small, "-o", tmp_path / "ab.html", "--title", MARKUP).product()
-    (found,) = visit([tmp_path / "ab.html"])
-    assert not found.words
-    assert not found.faults
+    call("bake", one, tmp_path / "wave.npz", "--clip", "wave", "--fps", "6").product()
+    call("view", tmp_path / "wave.npz", "-o", tmp_path / "cache.html", "--show", "bones").product()
+    found, cached = visit([tmp_path / "ab.html", tmp_path / "cache.html"])
+    assert not [*found.words, *cached.words]
+    assert not [*found.faults, *cached.faults]
     assert found.worst
 
 

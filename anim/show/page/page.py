@@ -151,7 +151,7 @@ def page(
     shown = [file] if other is None else [file, other]
     embedded = [embed(each.document, each.resolve) for each in shown]
     files = [
-        {"name": each.name, "bytes": each.size, "notes": [*each.notes, *made.notes]}
+        {"name": each.name, "bytes": each.size, "notes": [*each.notes, *made.notes], **_kind(each)}
         for each, made in zip(shown, embedded, strict=True)
     ]
     facts = {"files": files, "view": _view(view), **_content(content)}
@@ -192,6 +192,10 @@ def _json(value: Any) -> str:
 def _view(view: PageView) -> dict[str, Any]:
     named = {"clip": view.clip, "node": view.node, "t": view.time, "show": list(view.show)}
     return {name: value for name, value in named.items() if value not in (None, [])}
+
+
+def _kind(file: PageFile) -> dict[str, bool]:
+    return {} if file.cache is None else {"cache": True}
 
 
 def _content(content: PageContent) -> dict[str, Any]:

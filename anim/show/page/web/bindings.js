@@ -1,6 +1,7 @@
 // What the keys do.
 
 import { nextClip } from "./clips.js";
+import { facts, hasNodes } from "./data.js";
 import { $ } from "./dom.js";
 import { openSheet } from "./keyboard.js";
 import { focusFilter } from "./sidebar.js";
@@ -11,6 +12,7 @@ const STEP_S = 1 / 30;
 /** All keys, in the order of the sheet. */
 export function bindings(player) {
   const isPair = player.sides.length > 1;
+  const isShown = hasNodes(facts);
   const step = (direction) => (event) =>
     player.seek(state.time + direction * STEP_S * (event.shiftKey ? 10 : 1), { pause: true });
   return [
@@ -34,12 +36,12 @@ export function bindings(player) {
     { keys: ["-", "+"], label: "slower, faster", run: (event) => changeSpeed(event.key === "-" ? -1 : 1) },
     { keys: ["l"], label: "loop, once, ping-pong", run: () => cycle("loop", LOOPS) },
     { keys: ["f"], label: "frame the chosen node; again: everything", run: () => frame(player) },
-    { keys: ["s"], label: "skeleton", run: () => toggleShow("bones") },
+    { keys: ["s"], label: "skeleton", run: () => toggleShow("bones"), isShown },
     { keys: ["w"], label: "wireframe", run: () => toggleShow("wire") },
     { keys: ["o"], label: "onion skins", run: () => toggleShow("onion") },
     { keys: ["c"], label: "clay", run: () => toggleShow("clay") },
-    { keys: ["g"], label: "curves of the chosen node", run: () => toggleShow("curves") },
-    { keys: ["u"], label: "rotation as degrees from rest, or values", run: () => cycle("unit", UNITS) },
+    { keys: ["g"], label: "curves of the chosen node", run: () => toggleShow("curves"), isShown },
+    { keys: ["u"], label: "rotation as degrees from rest, or values", run: () => cycle("unit", UNITS), isShown },
     { keys: ["h"], label: "heat of the error", run: () => toggleShow("heat"), isShown: isPair },
     {
       keys: ["[", "]"],

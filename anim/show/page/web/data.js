@@ -2,6 +2,11 @@
 
 export const facts = JSON.parse(document.getElementById("facts").textContent);
 
+/** Whether a file of the page has nodes to show beside its meshes: not only vertex caches. */
+export function hasNodes({ files }) {
+  return files.some((file) => !file.cache);
+}
+
 /** Bytes of the file "a" or "b", or null if the page has none. */
 export async function readFile(id) {
   const text = document.getElementById(id).textContent;

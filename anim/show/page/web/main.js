@@ -4,7 +4,7 @@ import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
 import { bindings, fit, frame, isDark } from "./bindings.js";
 import { markClip, sortClips } from "./clips.js";
-import { facts, readFile } from "./data.js";
+import { facts, hasNodes, readFile } from "./data.js";
 import { $, setPressed } from "./dom.js";
 import { formatLength } from "./format.js";
 import { GRADIENT } from "./heat.js";
@@ -12,7 +12,7 @@ import { listenToKeys, openSheet } from "./keyboard.js";
 import { Player } from "./player.js";
 import { fillSidebar, markLink, markNode, markTab, scrollToChosen } from "./sidebar.js";
 import { Side } from "./side.js";
-import { SHOWS, SIDES, UNITS, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
+import { OF_NODES, SHOWS, SIDES, UNITS, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
 
 /** Bring the page in line with what changed. */
 function render(player, changed) {
@@ -136,7 +136,8 @@ function begin(player) {
   if (asked.camera) player.stage.moveCamera(asked.camera);
   player.resetHeatScale();
   if (asked.scale) update({ heatScale: asked.scale });
-  update({ node: node?.index ?? null, show: asked.show });
+  const show = [...asked.show].filter((name) => hasNodes(facts) || !OF_NODES.includes(name));
+  update({ node: node?.index ?? null, show: new Set(show) });
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   update({ playing: side.clips.length > 0 && asked.time === null && !isCalm });
   render(player, new Set(Object.keys(state)));
@@ -153,6 +154,7 @@ async function main() {
     if (bytes) sides.push(new Side(await loader.parseAsync(bytes, ""), facts.files[i]));
   }
   document.body.classList.toggle("pair", sides.length > 1);
+  document.body.classList.toggle("cache", !hasNodes(facts));
   document.body.classList.toggle("static", !sides[0].clips.length);
   $("#legend .scale").style.background = GRADIENT;
   const player = new Player(sides);

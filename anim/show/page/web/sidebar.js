@@ -1,6 +1,7 @@
 // The lists beside the picture, one at a time: findings or errors, clips, nodes, files.
 
 import { clipList } from "./clips.js";
+import { hasNodes } from "./data.js";
 import { $, make, setPressed } from "./dom.js";
 import { filtered } from "./filter.js";
 import { formatBytes } from "./format.js";
@@ -20,7 +21,7 @@ export function fillSidebar(sides, facts, actions) {
   const lists = [
     ["report", isPair ? "Errors" : "Findings", panels[0]?.count, panels.map((panel) => panelSection(panel, actions))],
     ["clips", "Clips", sides[0].clips.length, clipList(sides[0], facts, actions.chooseClip)],
-    ["nodes", "Nodes", sides[0].nodes.size, nodeList(sides[0], actions)],
+    ["nodes", "Nodes", sides[0].nodes.size, hasNodes(facts) ? nodeList(sides[0], actions) : []],
     ["files", isPair ? "Files" : "File", numNotes || "", fileList(facts)],
   ].filter(([, , , children]) => children.length);
   const tabs = lists.map(([name, title, count]) =>
@@ -38,7 +39,7 @@ export function fillSidebar(sides, facts, actions) {
   );
   $("#side").append(bar, ...bodies);
   $("#side").addEventListener("keydown", moveRow);
-  return panels.length || sides[0].clips.length ? lists[0][0] : "nodes";
+  return panels.length || sides[0].clips.length || !hasNodes(facts) ? lists[0][0] : "nodes";
 }
 
 /** Mark the first row that links to a clip and time of the first file, where the page begins. */

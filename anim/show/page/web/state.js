@@ -1,6 +1,7 @@
 // The state of the page, its listeners, and its copy in the URL, so that links and screenshots can be repeated.
 
 export const SHOWS = ["bones", "wire", "onion", "clay", "curves", "heat"];
+export const OF_NODES = ["bones", "curves"]; // which a vertex cache has none of
 export const SIDES = ["both", "a", "b"];
 export const LOOPS = ["loop", "once", "ping-pong"];
 export const UNITS = ["degrees", "values"];
