@@ -98,10 +98,19 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-def restore_fields(instance: Any, state: list[Any]) -> None:
-    """Restore the fields of a pickled or copied frozen dataclass, with read-only arrays."""
-    for field, value in zip(fields(instance), state, strict=True):
+def reduce_fields(instance: Any) -> tuple[Any, ...]:
+    """Return what `__reduce__` of a frozen dataclass returns, so that arrays of copies are read-only too.
+
+    Not by `__setstate__`, which dataclasses with slots replace before Python 3.11.4 (python/cpython#104035).
+    """
+    return _restore_fields, (type(instance), [getattr(instance, field.name) for field in fields(instance)])
+
+
+def _restore_fields(kind: type[Any], values: list[Any]) -> Any:
+    instance = object.__new__(kind)
+    for field, value in zip(fields(kind), values, strict=True):
         object.__setattr__(instance, field.name, freeze(value) if isinstance(value, np.ndarray) else value)
+    return instance
 
 
 def _is_frozen(array: AnyArray) -> bool:

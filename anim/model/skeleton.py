@@ -37,8 +37,8 @@ class Skeleton:
     morphed: tuple[MorphedNode, ...] = ()
     _levels: Any = field(init=False, repr=False)  # tuple of (M,) for each depth
 
-    def __setstate__(self, state: list[Any]) -> None:
-        arrays.restore_fields(self, state)
+    def __reduce__(self) -> tuple[Any, ...]:
+        return arrays.reduce_fields(self)
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__

@@ -28,8 +28,8 @@ class TimeAxis:
     def __init__(self, times: ArrayLike) -> None:
         object.__setattr__(self, "times", arrays.as_key_times(times))
 
-    def __setstate__(self, state: list[Any]) -> None:
-        arrays.restore_fields(self, state)
+    def __reduce__(self) -> tuple[Any, ...]:
+        return arrays.reduce_fields(self)
 
     def __len__(self) -> int:
         return len(self.times)

@@ -111,8 +111,8 @@ class Track:
         set_field(self, "in_tangents", _tangents(in_tangents, shape, "in tangents"))
         set_field(self, "out_tangents", _tangents(out_tangents, shape, "out tangents"))
 
-    def __setstate__(self, state: list[Any]) -> None:
-        arrays.restore_fields(self, state)
+    def __reduce__(self) -> tuple[Any, ...]:
+        return arrays.reduce_fields(self)
 
     @property
     def times(self) -> Floats:
