@@ -18,6 +18,7 @@ from anim.optimization.search.trial import CHORD_BOUND_FRACTION, BoundUsage, Tri
 from anim.optimization.tracks import clip_ends, key_reduction, morph_weights, quantization
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
+from anim.sampling.weight_pointers import moved_nodes
 
 MORPH_BUDGET_FRACTION = 0.4  # of the bound, for morph weights of a clip that moves joints too
 MORPH_ONLY_BUDGET_FRACTION = 0.95  # of the bound, for morph weights of a clip that moves no joint
@@ -148,13 +149,15 @@ class _TrackSorter:
         """Reduce morph weights within their own fraction of the bound; the search gets the rest."""
         context = self._context
         weights = [i for i, track in enumerate(self._clip.tracks) if _is_weights(track) and i not in self._dropped]
-        has_pointers = any(self._clip.tracks[i].node is None for i in weights)  # a node's track keeps them from it
+        # A node's own track, even one that equals the rest pose, replaces those of its mesh: it is not dropped
+        has_pointers = any(self._clip.tracks[i].node is None for i in weights)
         fraction = MORPH_BUDGET_FRACTION if self._free else MORPH_ONLY_BUDGET_FRACTION
         bound = fraction * self._task.bound / max(len(weights), 1)
         for i in weights:
             track = self._clip.tracks[i]
             reach = context.track_reach(track)
-            exact = context.bounds.max_error == 0 or track.node in context.policy.keep
+            kept = context.policy.keep.intersection(moved_nodes(context.skeleton, track))
+            exact = context.bounds.max_error == 0 or bool(kept)
             if exact or not reach.size or track.interpolation is Interpolation.STEP:
                 self._keep_track(i, key_reduction.reduce_lossless(track))
                 continue

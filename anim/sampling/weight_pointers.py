@@ -55,6 +55,15 @@ def ineffective_weight_pointers(skeleton: Skeleton, clip: Clip) -> list[str]:
     return list(dict.fromkeys(clip.tracks[i].pointer or "" for i in pointers if i not in used))
 
 
+def moved_nodes(skeleton: Skeleton, track: Track) -> list[int]:
+    """Return the nodes that a track can move: its own, or those with the morph weights that it points to."""
+    pointer = None if track.node is not None else _parse(track)
+    if pointer is None:
+        return [] if track.node is None else [track.node]
+    is_node = pointer.owner == "nodes"
+    return [each.node for each in skeleton.morphed if (each.node if is_node else each.mesh) == pointer.index]
+
+
 def _parse(track: Track) -> WeightPointer | None:
     return parse_weight_pointer(track.pointer)
 

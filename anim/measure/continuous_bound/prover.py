@@ -19,7 +19,7 @@ from anim.sampling.players import PLAYERS
 
 BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is not refined
 MAX_PARTS = 128  # maximum number of subintervals between two times
-MAX_REFINED_DEPTH = 256  # levels of moving nodes; the bounds of deeper ones are too loose for any number of samples
+MAX_REFINED_DEPTH = 256  # levels of the metric's skeletons; bounds of deeper ones are too loose for any samples
 PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # players with normalized arcs are adjacent
 LARGE_SKELETON = 1000  # moving nodes; from here on a step is LARGE_STEP_FRACTION as long, for memory
 LARGE_STEP_FRACTION = 0.125
@@ -76,9 +76,9 @@ class Prover:
         """Return an upper bound of the displacement of any vertex at any time, in all of the players.
 
         It is above the largest sample by at most `slack`, as a fraction of it, unless intervals between times would
-        need too many subdivisions, or nodes that move are below hundreds of others.
-        times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key: those of
-        `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
+        need too many subdivisions, or the metric's skeletons have hundreds of levels.
+        times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key, such as those
+        of `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
         largest sample. floor: m, bounds below it are not refined. longest: s, as for `interval_rise`.
         Nothing is proven for scenes with different hierarchies, for players other than those of PLAYERS, or if
         quaternions pass through zero or rotate too far between two times.

@@ -87,7 +87,7 @@ def merge_shells(nodes: Ints, points: Floats, names: Sequence[str], skeleton: Re
     """Return the groups of points (S, P, 3) around nodes (S,), in their spaces; without those that do not move."""
     anchors, moved = skeleton.anchors[nodes], matrix.apply(skeleton.offsets[nodes], points)
     found = []
-    for anchor in np.unique(anchors[anchors != skeleton.origin]).tolist():
+    for anchor in sorted(set(anchors[anchors != skeleton.origin].tolist())):
         rigid = [RigidPoints(names[nodes[i]], moved[i]) for i in np.flatnonzero(anchors == anchor).tolist()]
         found.append(MergedGroups(anchor, rigid, vertices=False))
     return found

@@ -93,7 +93,8 @@ class ErrorMetric:
     shell: as a fraction of the diagonal, the distance of six points around each node that moves no vertex; None ignores
     such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
     clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
-    num_static_points: number of vertices, or of points of shells if there are none, that no clip moves: in no group.
+    num_static_points: number of vertices of rigid meshes, or of points of shells if there are none, on nodes that no
+    clip moves: in no group.
     has_shell: whether there are such nodes, measured on a shell.
     """
 
@@ -280,7 +281,7 @@ def _posed(skeleton: Skeleton, poses: PoseSampler, asked: Sequence[tuple[str, Fl
     at = unique_sorted(np.concatenate([times for _, times in asked]))
     found = poses.at_each(at, [sampler(player) for player, _ in asked])
     frames = np.concatenate([i * len(at) + np.searchsorted(at, times) for i, (_, times) in enumerate(asked)])
-    if len(frames) == len(found.times):
+    if np.array_equal(frames, np.arange(len(found.times))):  # a proof may ask for a time twice
         return PosedSkeleton(skeleton, found)
     weights = {node: each[frames] for node, each in found.weights.items()}
     parts = found.translation[frames], found.rotation[frames], found.scale[frames]

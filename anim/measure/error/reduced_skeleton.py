@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix, quaternion
-from anim.model import Clip, Skeleton
+from anim.model import Clip, Skeleton, parse_weight_pointer
 from anim.sampling.pose import rest_pose
 from anim.sampling.world import local_by_node
 
@@ -24,7 +24,8 @@ class ReducedSkeleton:
 
     Parents of moving nodes that do not move themselves are kept too, with their matrix below the next moving node.
     versions: both skeletons of K nodes. nodes: (K,) indices of the kept ones among all N, −1 for the origin.
-    anchors: (N + 1,) index in `nodes` of each node's nearest kept node, the last one of −1, the world.
+    anchors: (N + 1,) index in `nodes` of the nearest node that moves, itself or above it, else of the origin; the last
+    one is that of −1, the world.
     offsets: (N + 1, 3, 4) anchor_from_node, the same in both versions.
     """
 
@@ -40,6 +41,9 @@ class ReducedSkeleton:
 
     def clip(self, clip: Clip) -> Clip:
         """Return a clip of moving nodes for the kept ones."""
+        animated = np.array([t.node for t in clip.tracks if t.node is not None], np.int64)
+        if (self.nodes[self.anchors[animated]] != animated).any():
+            raise ValueError("the clip moves nodes that were taken for static")
         return replace(
             clip,
             tracks=tuple(t if t.node is None else replace(t, node=int(self.anchors[t.node])) for t in clip.tracks),
@@ -57,7 +61,7 @@ def reduce_skeletons(
     if len(one) < MIN_NODES or not (np.array_equal(one.parents, other.parents) and _same(one.sheared, other.sheared)):
         return None
     tracks = {(track.node, track.path, track.pointer) for clip in clips for track in clip.tracks}
-    if any(node is None and "/weights" in (pointer or "") for node, _, pointer in tracks):
+    if any(node is None and parse_weight_pointer(pointer) is not None for node, _, pointer in tracks):
         return None
     moves = _differ(one, other)
     moves[[node for node, *_ in tracks if node is not None]] = True

@@ -17,6 +17,7 @@ from anim.optimization.options import Bounds, Effort, Policy
 from anim.optimization.tracks import morph_weights
 from anim.optimization.tracks.quantization import Encoding
 from anim.sampling.pose import rest_world
+from anim.sampling.weight_pointers import moved_nodes
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,20 +48,12 @@ class Context:
 
     def track_reach(self, track: Track) -> Floats:
         """Return the displacement (C, V), m, of each vertex that weights of a track move, by each at weight 1."""
-        if track.node is not None:
-            return self.morph_reach(track.node)
-        pointer = parse_weight_pointer(track.pointer)
-        assert pointer is not None
-        moved = [
-            self.morph_reach(each.node)
-            for each in self.skeleton.morphed
-            if (each.node if pointer.owner == "nodes" else each.mesh) == pointer.index
-        ]
-        moved = [each for each in moved if each.size]
+        moved = [each for each in map(self.morph_reach, moved_nodes(self.skeleton, track)) if each.size]
         if not moved:
             return np.zeros((0, 0))
         every = np.concatenate(moved, axis=1)
-        return every if pointer.target is None else every[pointer.target : pointer.target + 1]
+        pointer = parse_weight_pointer(track.pointer)
+        return every if pointer is None or pointer.target is None else every[pointer.target : pointer.target + 1]
 
     def weights_at_rest(self, node: int) -> Floats:
         """Return the morph weights (M,) of a node in the rest pose."""

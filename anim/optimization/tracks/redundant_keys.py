@@ -10,6 +10,7 @@ from anim.optimization.options import Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.needed_keys import needed_keys
 from anim.optimization.tracks.quantization import EncodedKeys
+from anim.sampling.weight_pointers import moved_nodes
 
 
 def drop_redundant_keys(solution: Solution, skeleton: Skeleton, request: Request) -> Solution | None:
@@ -20,7 +21,7 @@ def drop_redundant_keys(solution: Solution, skeleton: Skeleton, request: Request
     must stay exact keep all keys.
     """
     pairs = list(zip(solution.clip.tracks, solution.stored, strict=True))
-    free = [k for k, (track, _) in enumerate(pairs) if not _is_exact(track, request)]
+    free = [k for k, (track, _) in enumerate(pairs) if not _is_exact(track, skeleton, request)]
     new = dict(zip(free, _drop_from([pairs[k] for k in free], skeleton), strict=True))
     if all(stored is pairs[k][1] for k, (_, stored) in new.items()):
         return None
@@ -29,10 +30,10 @@ def drop_redundant_keys(solution: Solution, skeleton: Skeleton, request: Request
     return Solution(clip, tuple(stored for _, stored in slim), solution.dropped)
 
 
-def _is_exact(track: Track, request: Request) -> bool:
+def _is_exact(track: Track, skeleton: Skeleton, request: Request) -> bool:
     if track.node is None and parse_weight_pointer(track.pointer) is None:
         return request.bounds.max_pointer_error == 0
-    return request.bounds.max_error == 0 or track.node in request.policy.keep
+    return request.bounds.max_error == 0 or not request.policy.keep.isdisjoint(moved_nodes(skeleton, track))
 
 
 def _drop_from(pairs: Sequence[tuple[Track, EncodedKeys]], skeleton: Skeleton) -> list[tuple[Track, EncodedKeys]]:

@@ -20,6 +20,7 @@ from anim.optimization.options import PLAYERS as VERIFIED
 from anim.optimization.options import Bounds, Drop, Objective, Packing, Policy, Request
 from anim.sampling.players import PLAYERS
 from anim.sampling.track import sample
+from anim.sampling.weight_pointers import moved_nodes
 from tests.files import glb_of, opened, opened_fixture, opened_path
 from tests.khronos import errors, needs_validator, validate_many
 
@@ -233,6 +234,21 @@ def test_morph_weights_by_pointers_have_the_bound_of_vertices() -> None:
     apart = 0.25 * float(np.abs(sample(new, at) - sample(track, at)).max())
     assert 1e-3 < apart <= request.bounds.max_error
     assert found.verdicts[number].error.max_error == pytest.approx(apart, rel=0.05)
+
+
+def test_kept_nodes_keep_morph_weights_by_pointers() -> None:
+    document = opened_fixture("pointer")
+    clips = reader.clips(document)
+    number = next(i for i, each in enumerate(clips) if each.name == "one_weight")
+    times = np.arange(40) / 30
+    track = clips[number].tracks[0].with_keys(times, np.sin(times * 5)[:, None] * 0.5 + 0.5)
+    document = writer.replace_clips(document, {number: replace(clips[number], tracks=(track,))})
+    track = reader.clips(document)[number].tracks[0]  # as stored
+    nodes = frozenset(moved_nodes(reader.skeleton(document), track))
+    assert nodes
+    _, written = _optimized(document, _request(document, 5e-3, policy=Policy(keep=nodes)))
+    new = reader.clips(written)[number].tracks[0]
+    np.testing.assert_allclose(sample(new, track.times), track.values, rtol=0, atol=1e-7)
 
 
 def test_a_bound_that_no_storage_keeps_leaves_the_motion_as_it_is() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anim.measure.continuous_bound import prover as continuous_bound
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene, TimeAxis
@@ -120,6 +121,20 @@ def test_a_proof_needs_few_samples() -> None:
     assert 4 * proven.error.times < plain.error.times
     assert proven.error.max_error == pytest.approx(plain.error.max_error, rel=0.005)
     assert plain.error.max_error <= proven.certified
+
+
+def test_a_loose_proof_of_few_samples_is_not_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its error would be that of few times, which may be far below the largest."""
+    monkeypatch.setattr(continuous_bound, "MAX_REFINED_DEPTH", 0)
+    times = np.arange(49) / 24
+    before = clip(track("rotation", times, about("z", 40 * np.sin(3 * times))))
+    after = clip(track("rotation", times[::4], about("z", 40 * np.sin(3 * times[::4]))))
+    plain, proven = (
+        verify(RULER, before, after, bounds=Bounds(0.5, 0.0), reference=Reference.CURVE, prover=prover)
+        for prover in (None, Prover(RULER))
+    )
+    assert proven.certified is not None
+    assert proven.error.max_error == plain.error.max_error
 
 
 def test_nothing_is_proven_where_the_bound_is_broken_or_only_keys_count() -> None:

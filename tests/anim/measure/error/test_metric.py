@@ -128,3 +128,13 @@ def test_pointers_are_compared_as_a_share_of_their_range() -> None:
 def _product(a: Floats, b: Floats) -> Floats:
     av, aw, bv, bw = a[:3], a[3], b[:3], b[3]
     return np.array([*(aw * bv + bw * av + np.cross(av, bv)), aw * bw - av @ bv])
+
+
+def test_poses_at_a_time_that_is_asked_for_twice() -> None:
+    """A continuous bound does so where an interval has no middle."""
+    scene = points_on_a_node([[1, 0, 0]])
+    before = clip(track("rotation", [0, 1], about("z", [0, 60])))
+    after = clip(track("rotation", [0, 1], about("z", [0, 90])))
+    asked = [("spec", np.array([0, 0.5, 1, 1])), ("nlerp", np.array([0, 1]))]
+    for pose in ErrorMetric(scene).posed(before, after, asked):
+        np.testing.assert_array_equal(pose.times, [0, 0.5, 1, 1, 0, 1])
