@@ -28,8 +28,8 @@ slow: $(BIN)/.installed $(PAGE)
 
 # Other random examples of the properties than the gate's, then mutations of fixtures for hours; inputs with faults go to
 # fuzz-out (`python -m tests.fuzz --help`).
-fuzz: $(BIN)/.installed
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --hypothesis-profile default
+fuzz: $(BIN)/.installed $(PAGE)
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --hypothesis-profile random
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --seed $$(date +%s) --keep fuzz-out
 
 # The reference of commands, and the pages' pictures and output.

@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, settings
 from tests.files import ASSETS, BAD_INPUTS, SHARED
 
 settings.register_profile("gate", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("random", settings.get_profile("gate"), derandomize=False)
 settings.load_profile("gate")
 
 
