@@ -78,7 +78,8 @@ def _compare(one: PageFile, other: PageFile) -> PageContent:
         partners = {0: 0} if len(clips[0]) and len(clips[1]) == 1 else {}
         return PageContent(partners=partners, meshes=pair_cache_meshes(one, other))
     try:
-        ruler = ErrorMetric(reader.scene(one.document), reader.scene(other.document))
+        scenes = reader.scene(one.document), reader.scene(other.document)
+        ruler = ErrorMetric(*scenes, clips=clips[0] + clips[1])
         pairs = compare_clips(ruler, *clips)
     except AnimError:
         return EMPTY

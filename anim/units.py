@@ -22,9 +22,9 @@ def format_number(value: float, digits: int) -> str:
     return rounded.rstrip("0").rstrip(".")
 
 
-def plural(count: int, noun: str) -> str:
-    """Return "1 clip", "3 clips"."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+def plural(count: int, noun: str, many: str = "") -> str:
+    """Return "1 clip", "3 clips"; with `many`, a plural without s: "3 vertices"."""
+    return f"{count} {noun if count == 1 else many or noun + 's'}"
 
 
 def parse_fraction(text: str, name: str) -> float:

@@ -64,7 +64,7 @@ def _figures(clip: ClipReport) -> list[ClipFigure]:
 def _skin_row(skin: SkinReport) -> PageRow:
     parts = [plural(skin.joints, "joint")]
     parts += [f"{skin.unused_joints} unused"] if skin.unused_joints else []
-    parts += [plural(skin.vertices, "vertex").replace("vertexs", "vertices")] if skin.vertices else []
+    parts += [plural(skin.vertices, "vertex", "vertices")] if skin.vertices else []
     if skin.mean_influences is not None:
         parts.append(f"{skin.mean_influences:.2f} influences on average, {skin.most_influences} at most")
     parts += [f"{skin.off_sums} weight sums ≠ 1"] if skin.off_sums else []

@@ -30,7 +30,7 @@ def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: s
             meshes = pair_cache_meshes(one, other) if is_cached else _pair_bake(old, new, counts[1])
             partners = {_played(clips, clip): 0} if len(clips[1]) == 1 else {}
             return PageContent(partners=partners, meshes=meshes)
-        ruler = ErrorMetric(old, new)
+        ruler = ErrorMetric(old, new, clips=clips[0] + clips[1])
         return compare_content(ruler, *clips, compare_clips(ruler, *clips))
     except AnimError as error:
         reporter.info(f"note: without errors over time: {error}")

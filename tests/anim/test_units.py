@@ -23,3 +23,4 @@ def test_a_number_beyond_float64_is_refused() -> None:
 
 def test_a_count_has_its_noun_in_the_singular_or_plural() -> None:
     assert [plural(count, "clip") for count in (0, 1, 2)] == ["0 clips", "1 clip", "2 clips"]
+    assert [plural(count, "vertex", "vertices") for count in (1, 2)] == ["1 vertex", "2 vertices"]

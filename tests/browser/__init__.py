@@ -25,6 +25,7 @@ from tests import pages
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "browser" / "visit.mjs"
+EVALUATE = SCRIPT.with_name("evaluate.mjs")
 CHROMIUM = "chromium"
 OTHER_ENGINES = ("firefox", "webkit")
 EXECUTABLES = {CHROMIUM: ("chromium", "chromium-browser", "google-chrome"), "firefox": ("firefox", "firefox-esr")}
@@ -91,6 +92,17 @@ def visit(files: Sequence[Path], engine: str = CHROMIUM) -> list[Visit]:
         )
         for found in json.loads(run.stdout)
     ]
+
+
+def evaluate(file: Path, visits: Sequence[tuple[str, Sequence[str]]]) -> list[list[Any]]:
+    """Open a page in Chromium at addresses, each "#…" or "", and return the values of code there, and its messages."""
+    about = {"library": str(package()), "executable": str(executable())}
+    visited = [{"file": str(file), "hash": hash, "codes": list(codes)} for hash, codes in visits]
+    command = ["node", str(EVALUATE), json.dumps({**about, "visits": visited})]
+    run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
+    if run.returncode:
+        raise RuntimeError(run.stderr.decode(errors="replace"))
+    return list(json.loads(run.stdout))
 
 
 def missing(engine: str = CHROMIUM) -> str:

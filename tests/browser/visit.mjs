@@ -11,8 +11,8 @@ const { engine, library, executable, shots, files } = JSON.parse(process.argv[2]
 const READY_MS = 600000; // software GL under load takes minutes for some shaders
 const READY = "document.documentElement.dataset.ready || document.documentElement.dataset.error || ''";
 // What a link to the page shows
-const STATE = `(({ clip, node, show, side, unit, speed, loop, heatScale }) => JSON.stringify(
-  [clip, node, [...show].sort(), side, unit, speed, loop, heatScale.toPrecision(6), player.stage.cameraText]))(player.state)`;
+const STATE = `(({ clip, node, show, side, unit, speed, loop, heatScale, tab, sort }) => JSON.stringify([clip, node,
+  [...show].sort(), side, unit, speed, loop, heatScale.toPrecision(6), tab, sort, player.stage.cameraText]))(player.state)`;
 const PIN = `(() => {
   const spot = player.stage.project(player.worst().point, player.sides[1]);
   const [x, y] = document.querySelector("#pin").style.transform.match(/-?[\\d.]+/g).map(Number);
@@ -23,21 +23,32 @@ const AXES = `(() => {
   const [one, other] = ["#curves canvas", "#scrub canvas"].map((each) => document.querySelector(each).getBoundingClientRect());
   return document.querySelector("footer").checkVisibility() ? one.left === other.left && one.right === other.right : true;
 })()`;
-// An animated node whose curves are the same in both files, as the panel of curves states
+// The panel of curves names a node that moves the same in both files, and none with another track or rest pose
 const EQUAL = `(() => {
   const [a, b] = player.sides;
-  const isSame = ([node, tracks]) => tracks.every(({ path }) => path !== "weights") &&
+  const isNamed = () => (player.update({ node: null }), player.update({ node }), !document.querySelector("#curves-equal").hidden);
+  const isSkinned = (node) => a.meshes.some((mesh) => mesh.isSkinnedMesh && a.owners.get(mesh) === node);
+  const isFit = ([node, tracks]) => !isSkinned(node) && tracks.every(({ path }) => path !== "weights") &&
     [...b.nodes.values()].find(({ name }) => name === a.nodes.get(node).name)?.index === node;
-  const [node] = [...a.tracks].find(isSame) ?? [null];
-  const [chosen, own] = [player.state.node, b.tracks];
-  if (node === null || !player.isPaired) return true;
-  b.tracks = a.tracks;
-  player.update({ node: null });
-  player.update({ node });
-  const isNamed = !document.querySelector("#curves-equal").hidden;
-  b.tracks = own;
-  player.update({ node: chosen });
-  return isNamed;
+  const [node, tracks] = [...a.tracks].find(isFit) ?? [null];
+  const own = [player.state.node, b.tracks];
+  if (node === null || !player.isPaired) return !a.nodes.size || a.tracks.size < 2 || b.tracks.size < 2;
+  const rests = [b.nodes.get(node).rest, { ...a.nodes.get(node).rest }];
+  b.tracks = new Map(a.tracks);
+  b.nodes.get(node).rest = rests[1];
+  const found = [isNamed()];
+  const [{ path, track }] = tracks;
+  const changed = track.clone();
+  changed.createInterpolant = track.createInterpolant; // of cubic splines, which clones lack
+  changed.values = track.values.map((value, i) => value + (i % 2));
+  b.tracks.set(node, [{ path, track: changed }, ...tracks.slice(1)]);
+  found.push(isNamed());
+  b.tracks.set(node, tracks.slice(1));
+  rests[1][path] = rests[1][path].clone().set(...(path === "rotation" ? [0.6, 0, 0, 0.8] : [7, 7, 7]));
+  found.push(isNamed());
+  [b.nodes.get(node).rest, b.tracks] = [rests[0], own[1]];
+  player.update({ node: own[0] });
+  return found.join() === "true,false,false";
 })()`;
 const NO_ENGINE = 3; // exit code
 const browser = await launch(engine, { library, executable }).catch((error) => leave(error.stack ?? error));
@@ -63,7 +74,7 @@ async function open(file, hash, isPhone = false) {
 }
 
 async function tryDesktop(file, faults) {
-  const { page, ms } = await open(file, "#t=0&show=");
+  const { page, ms } = await open(file, `#t=0&show=&list=${encodeURIComponent(`x"], '`)}`);
   const { words } = page;
   const expect = (isTrue, fault) => isTrue || faults.push(fault);
   const get = page.run;
@@ -82,6 +93,7 @@ async function tryDesktop(file, faults) {
   expect(await get(`document.querySelector("#loading").hidden`), "says that it loads, though it is shown");
   const duration = await get("player.duration");
   const clips = await get("player.sides[0].clips.length");
+  expect(!(await get("player.stage.cameraText")), "the address has no camera before it moves");
   if (clips) {
     const at = (seconds) => Math.min(seconds, duration);
     await press("ArrowRight");
@@ -112,8 +124,10 @@ async function tryDesktop(file, faults) {
     const clip = await get("player.state.clip");
     await press("n");
     expect((await get("player.state.clip")) === (clip + 1) % clips, "next clip");
+    expect(Boolean(await get("player.stage.cameraText")) === clips > 1, "the address has the camera beside another clip");
     await press("p");
     expect((await get("player.state.clip")) === clip, "clip before");
+    expect(!(await get("player.stage.cameraText")), "the address has no camera beside the clip that it frames");
   }
   const listed = await get(`document.querySelectorAll("[data-clip]").length`);
   if (await get(`document.querySelector("#list-clips input") !== null`)) {
@@ -197,7 +211,6 @@ async function tryDesktop(file, faults) {
       player.follow(link);
       return {clip: link.clip, time: link.time, error: player.worst().error};
     }))(JSON.parse(document.getElementById("facts").textContent))`);
-  expect(!(await get("player.stage.cameraText")), "the address has no camera before it moves");
   await get("(player.stage.camera.position.multiplyScalar(1.2), player.stage.controls.update(), true)");
   expect(await get("player.stage.cameraText.split(',').length === 6"), "the address has the camera");
   await until(page, "location.hash === player.address()");

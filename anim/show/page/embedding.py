@@ -22,6 +22,7 @@ from anim.show.page.embedded_references import drop_references
 from anim.show.page.embedded_tracks import resolve_pointers, rewrite_tracks
 from anim.show.page.packing import Packing
 from anim.show.page.sticks import add_sticks
+from anim.units import plural
 
 UNLIT = "KHR_materials_unlit"  # three.js fails on it where the file does not name it
 MAX_INFLUENCES = 4  # per vertex in three.js
@@ -84,7 +85,7 @@ def _decode_draco(document: Document, notes: list[str]) -> Document:
     try:
         return decode_draco(document, used)
     except UnsupportedError as error:
-        notes.append(f"{_counted(len(used), 'mesh', 'meshes')} not drawn: {error.problem}")
+        notes.append(f"{plural(len(used), 'mesh', 'meshes')} not drawn: {error.problem}")
     json = copy_json(document.json)
     for i in used:
         mesh = json["meshes"][i]
@@ -114,7 +115,7 @@ def _check_meshes(document: Document) -> list[str]:
                 raise error.at(f"node {i}") from None
     if not wide:
         return []
-    return [f"{_counted(wide, 'mesh', 'meshes')} shown with {MAX_INFLUENCES} influences per vertex, not all"]
+    return [f"{plural(wide, 'mesh', 'meshes')} shown with {MAX_INFLUENCES} influences per vertex, not all"]
 
 
 def _name_extensions(json: Json) -> list[str]:
@@ -134,7 +135,3 @@ def _name_extensions(json: Json) -> list[str]:
 def _is_unlit(material: Any) -> bool:
     extensions = material.get("extensions") if isinstance(material, dict) else None
     return isinstance(extensions, dict) and UNLIT in extensions
-
-
-def _counted(count: int, one: str, many: str) -> str:
-    return f"{count} {one if count == 1 else many}"

@@ -100,9 +100,10 @@ class ClipFigure:
 
 @dataclass(frozen=True, slots=True)
 class ClipError:
-    """Error of one clip over time: its maximum, times in s, and errors in m at these times.
+    """Error of one clip over time.
 
-    joint, time: position of the maximum, and its time in s; "" and 0 if there is no error.
+    max: the largest error, in m. times, errors: the curve, in s and m; empty for one that the page does not draw.
+    joint: the node nearest to the largest error, "" where vertices were compared. time: of the largest error, in s.
     """
 
     max: float

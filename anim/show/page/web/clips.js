@@ -17,7 +17,7 @@ export function clipList(side, facts, chooseClip) {
     bar.style.setProperty("--part", clip.duration / longest);
     return make(
       "button",
-      { class: "row clip", "data-clip": i, title: side.clipNames[i], onclick: () => chooseClip(i) },
+      { class: "row", "data-clip": i, title: side.clipNames[i], onclick: () => chooseClip(i) },
       make("span", { class: "name" }, ...breakable(side.clipNames[i])),
       error === undefined ? null : make("span", { class: error ? "hot" : "dim" }, formatLength(error)),
       make("span", { class: "dim" }, formatTime(clip.duration)),

@@ -15,6 +15,7 @@ const MIN_LABEL_PX = 20; // between labels of values
 const MIN_RANGE_PER_VALUE = 1e-3; // of a graph; less is rounding
 const MIN_RANGE_DEGREES = 1;
 const EQUAL_PER_VALUE = 1e-5; // of the largest value of a track: rounding in float32
+const REST_UNITS = { translation: 0, rotation: 180 / Math.PI, scale: 0 }; // least size of values for this tolerance
 const COLORS = ["--x", "--y", "--z", "--w"];
 const AXES = ["x", "y", "z", "w"];
 const PATH_UNITS = { translation: "m", rotation: "", scale: "×", weights: "" };
@@ -33,7 +34,7 @@ export class Curves {
     });
   }
 
-  /** sides: tracks of the chosen node per file, [{path, track}], and its rest rotation. */
+  /** sides: tracks of the chosen node per file, [{path, track}], and its rest pose. */
   draw({ sides, duration, time, unit, message }) {
     this.duration = Math.max(duration, 1e-6);
     const { context, width, height } = begin(this.canvas);
@@ -52,7 +53,7 @@ export class Curves {
     const part = height / paths.length;
     for (const [i, path] of paths.entries()) {
       const graphs = sides.flatMap((side, which) =>
-        side.tracks.filter((each) => each.path === path).map((each) => ({ which, ...graph(each, side.rest, unit) })),
+        side.tracks.filter((each) => each.path === path).map((each) => ({ which, ...graph(each, side.rest?.rotation, unit) })),
       );
       if (i) {
         context.fillStyle = ink("--line");
@@ -127,17 +128,26 @@ function drawValues(context, { values, size, unit, y, axis }) {
   context.textAlign = "left";
 }
 
-/** Whether tracks of a node in both files, [{path, track}], have the same values; rest: rotation that both begin at. */
-export function areEqual(one, other, rest, duration) {
-  if (!one.length || one.length !== other.length) return false;
-  const times = Array.from({ length: SAMPLES + 1 }, (_, i) => (duration * i) / SAMPLES);
-  return one.every((each) => {
-    const partner = other.find(({ path }) => path === each.path);
-    if (!partner || each.path === "weights") return false; // whose meshes no parent deforms
-    const [mine, its] = [each, partner].map((track) => times.map(graph(track, rest, "degrees").at).flat());
-    const tolerance = EQUAL_PER_VALUE * Math.max(...mine.map(Math.abs));
-    return mine.length === its.length && mine.every((value, i) => Math.abs(value - its[i]) <= tolerance);
+/** Whether a node moves the same in both files, each {tracks: [{path, track}], rest}: its tracks, else its rest pose. */
+export function areEqual(one, other, duration) {
+  const tracks = [...one.tracks, ...other.tracks];
+  if (!tracks.length || tracks.some(({ path }) => path === "weights")) return false; // no parent deforms a mesh
+  const keys = tracks.flatMap(({ track }) => [...track.times]);
+  const times = [...keys, ...Array.from({ length: SAMPLES + 1 }, (_, i) => (duration * i) / SAMPLES)];
+  return Object.entries(REST_UNITS).every(([path, size]) => {
+    const [mine, its] = [one, other].map((node) => valuesOver(times, node, path, one.rest));
+    const tolerance = EQUAL_PER_VALUE * mine.reduce((most, value) => Math.max(most, Math.abs(value)), size);
+    return mine.every((value, i) => Math.abs(value - its[i]) <= tolerance);
   });
+}
+
+/** Values of a path of a node at times, from its track or its rest pose; rotations from the rest of the first file. */
+function valuesOver(times, { tracks, rest }, path, { rotation }) {
+  const found = tracks.find((each) => each.path === path);
+  if (found) return times.map(graph(found, rotation, "degrees").at).flat();
+  const values = rest[path].toArray();
+  const shown = path === "rotation" ? rotationVector(values, rotation) : values;
+  return times.flatMap(() => shown);
 }
 
 function drawKeys(context, { times, size, at, tangents, which }, x, y) {

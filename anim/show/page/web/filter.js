@@ -2,7 +2,7 @@
 
 import { make } from "./dom.js";
 
-export const MIN_FILTERED = 8; // rows from which on a list has a filter
+const MIN_FILTERED = 8; // rows from which on a list has a filter
 
 /** A filter, what is beside it, and the rows, whose titles it looks into. */
 export function filtered(rows, what, ...beside) {

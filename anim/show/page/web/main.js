@@ -10,7 +10,7 @@ import { formatLength } from "./format.js";
 import { GRADIENT } from "./heat.js";
 import { listenToKeys, openSheet } from "./keyboard.js";
 import { Player } from "./player.js";
-import { fillSidebar, markLink, markNode, markTab, scrollToChosen } from "./sidebar.js";
+import { fillSidebar, markLink, markNode, markTab, scrollToChosen, showSide } from "./sidebar.js";
 import { Side } from "./side.js";
 import { OF_NODES, SHOWS, SIDES, UNITS, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
 
@@ -34,12 +34,13 @@ function render(player, changed) {
     player.drawTimeline();
   }
   if (has("show")) {
-    if (state.show.has("curves") && $("#curves").hidden && state.node === null) update({ tab: "nodes" }); // to choose one
+    const isNodeless = state.show.has("curves") && $("#curves").hidden && state.node === null;
+    if (isNodeless && $("#tab-nodes")) update({ tab: "nodes" }); // to choose one
     for (const name of SHOWS) setPressed($(`#show-${name}`), state.show.has(name));
     $("#curves").hidden = !state.show.has("curves");
-    $("#legend").hidden = !(state.show.has("heat") && player.sides.length > 1);
     player.applyMaterials();
   }
+  if (has("clip", "show")) $("#legend").hidden = !(state.show.has("heat") && player.isPaired);
   if (has("side")) {
     for (const name of SIDES) setPressed($(`#side-${name}`), state.side === name);
     document.body.dataset.side = state.side;
@@ -61,21 +62,38 @@ function render(player, changed) {
 
 function hashOf(player) {
   const [side] = player.sides;
+  const { node = null, show = [] } = facts.view ?? {};
   return {
-    clip: side.clipNames[state.clip],
+    clip: side.clips.length ? clipText(side, state.clip) : null,
     t: state.time.toFixed(3),
-    node: state.node === null ? null : side.nodes.get(state.node)?.name,
-    show: [...state.show].join(","),
-    side: state.side === "both" ? null : state.side,
-    theme: state.theme === "auto" ? null : state.theme,
-    unit: state.unit === "degrees" ? null : state.unit,
-    list: state.tab === player.firstTab ? null : state.tab,
+    node: state.node === null ? unless(node === null, "") : side.nodes.get(state.node)?.name,
+    show: state.show.size ? [...state.show].join(",") : unless(!show.length, ""),
+    side: unless(state.side === "both", state.side),
+    theme: unless(state.theme === "auto", state.theme),
+    unit: unless(state.unit === "degrees", state.unit),
+    list: state.tab,
     sort: state.sort || null,
-    speed: state.speed === 1 ? null : state.speed,
-    loop: state.loop === "loop" ? null : state.loop,
-    scale: state.heatScale === player.ownHeatScale ? null : state.heatScale,
-    camera: player.stage.cameraText,
+    speed: unless(state.speed === 1, state.speed),
+    loop: unless(state.loop === "loop", state.loop),
+    scale: unless(state.heatScale === player.ownHeatScale, state.heatScale),
+    camera: player.stage.cameraText || null,
   };
+}
+
+/** A value of the address, or null where the page has it without an address. */
+function unless(isDefault, value) {
+  return isDefault ? null : value;
+}
+
+/** The clip in the address: its name, or "#" and its index where a clip before it has the same name. */
+function clipText({ clipNames }, index) {
+  return clipNames.indexOf(clipNames[index]) === index ? clipNames[index] : `#${index}`;
+}
+
+/** Index of the clip that the address names, -1 for none. */
+function clipIndex({ clipNames }, text) {
+  const named = clipNames.indexOf(text);
+  return named >= 0 ? named : clipNames.findIndex((_, i) => `#${i}` === text);
 }
 
 function connect(player) {
@@ -85,7 +103,7 @@ function connect(player) {
   $("#help").addEventListener("click", openSheet);
   $("#fit").addEventListener("click", () => frame(player));
   $("#theme").addEventListener("click", () => update({ theme: isDark() ? "light" : "dark" }));
-  $("#menu").addEventListener("click", () => document.body.classList.toggle("with-side"));
+  $("#menu").addEventListener("click", () => showSide(!document.body.classList.contains("with-side")));
   for (const name of UNITS) $(`#unit-${name}`).addEventListener("click", () => update({ unit: name }));
   $("#speed").addEventListener("change", (event) => update({ speed: Number(event.target.value) }));
   $("#loop").addEventListener("change", (event) => update({ loop: event.target.value }));
@@ -110,7 +128,7 @@ function connect(player) {
 function actions(player) {
   const closing = (action) => (argument) => {
     action(argument);
-    document.body.classList.remove("with-side");
+    showSide(false);
   };
   return {
     chooseClip: closing((index) => player.chooseClip(index)),
@@ -125,12 +143,11 @@ function actions(player) {
 function begin(player) {
   const [side] = player.sides;
   const asked = readHash(facts.view ?? {});
-  const clip = side.clipNames.indexOf(asked.clip);
+  const clip = clipIndex(side, asked.clip);
   const nodes = [...side.nodes.values()];
   const node = nodes.find((each) => each.name === asked.node) ?? nodes.find((each) => `#${each.index}` === asked.node);
   const { theme, unit, speed, loop } = asked;
-  const tab = $(`#tab-${asked.tab}`) ? asked.tab : player.firstTab;
-  update({ theme, unit, speed, loop, tab, sort: asked.sort, side: asked.side });
+  update({ theme, unit, speed, loop, tab: player.firstTab, sort: asked.sort, side: asked.side });
   if (side.clips.length) player.chooseClip(Math.max(clip, 0), asked.time ?? 0);
   fit(player);
   if (asked.camera) player.stage.moveCamera(asked.camera);
@@ -138,6 +155,7 @@ function begin(player) {
   if (asked.scale) update({ heatScale: asked.scale });
   const show = [...asked.show].filter((name) => hasNodes(facts) || !OF_NODES.includes(name));
   update({ node: node?.index ?? null, show: new Set(show) });
+  if (asked.tab && document.getElementById(`tab-${asked.tab}`)) update({ tab: asked.tab }); // curves without a node chose another
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   update({ playing: side.clips.length > 0 && asked.time === null && !isCalm });
   render(player, new Set(Object.keys(state)));

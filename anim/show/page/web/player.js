@@ -192,20 +192,20 @@ export class Player {
 
   /** Name the parents where the chosen node has the same curves in both files. */
   compareCurves() {
-    const [a, b] = this.sides;
-    const index = state.node === null || !this.isPaired ? null : this.#nodeIn(b ?? a);
-    const isBoth = Boolean(b) && index !== null;
-    const tracks = isBoth ? [a.tracks?.get(state.node) ?? [], b.tracks?.get(index) ?? []] : [[], []];
-    const rest = a.nodes.get(state.node)?.rest.quaternion;
-    $("#curves-equal").hidden = !areEqual(...tracks, rest, this.duration);
+    const nodes = this.isPaired ? this.sides.map((side) => this.#motionIn(side)) : [];
+    const isKnown = nodes.length > 1 && nodes.every(({ rest, isSkinned }) => rest && !isSkinned);
+    $("#curves-equal").hidden = !(isKnown && areEqual(...nodes, this.duration));
+  }
+
+  /** Tracks and rest pose of the chosen node in a side, and whether it only names a mesh that joints move. */
+  #motionIn(side) {
+    const index = this.#nodeIn(side);
+    const isSkinned = side.meshes.some((mesh) => mesh.isSkinnedMesh && side.owners.get(mesh) === index);
+    return { tracks: side.tracks?.get(index) ?? [], rest: side.nodes.get(index)?.rest, isSkinned };
   }
 
   #drawCurves() {
-    const sides = this.sides.map((side) => {
-      const index = this.#nodeIn(side);
-      const node = index === null ? null : side.nodes.get(index);
-      return { tracks: side.tracks?.get(index) ?? [], rest: node?.rest.quaternion };
-    });
+    const sides = this.sides.map((side) => this.#motionIn(side));
     const name = state.node === null ? null : this.sides[0].nodes.get(state.node)?.name;
     $("#curves-name").textContent = name ?? "Curves";
     const message = name ? `'${name}' has no track in this clip` : "Choose a node in the list, or click a joint";

@@ -82,7 +82,8 @@ function nodesOf(gltf) {
   const joints = new Set((gltf.parser.json.skins ?? []).flatMap((skin) => skin.joints));
   for (const node of nodes.values()) {
     node.isJoint = joints.has(node.index);
-    node.rest = { quaternion: node.object.quaternion.normalize().clone() };
+    const { position, quaternion, scale } = node.object;
+    node.rest = { translation: position.clone(), rotation: quaternion.normalize().clone(), scale: scale.clone() };
   }
   return nodes;
 }

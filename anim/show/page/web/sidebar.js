@@ -69,9 +69,15 @@ export function scrollToChosen() {
   for (const row of document.querySelectorAll('#side .row[aria-pressed="true"]')) row.scrollIntoView({ block: "nearest" });
 }
 
+/** Show the lists where they cover the picture, on a phone. */
+export function showSide(isShown) {
+  document.body.classList.toggle("with-side", isShown);
+  $("#menu").setAttribute("aria-expanded", isShown ? "true" : "false");
+}
+
 /** Put the cursor in the filter of the list that is shown, if it has one. */
 export function focusFilter() {
-  document.body.classList.add("with-side");
+  showSide(true);
   $(`#list-${state.tab} input[type="search"]`)?.focus();
 }
 
@@ -90,10 +96,14 @@ function moveTab(event, tabs) {
 function moveRow(event) {
   const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
   if (!step || event.target.tagName === "SELECT") return;
-  const rows = [...$(`#list-${state.tab}`).querySelectorAll("button.row")].filter((row) => !row.hidden);
+  const rows = [...$(`#list-${state.tab}`).querySelectorAll("button.row")].filter(isReachable);
   const next = rows[rows.indexOf(event.target.closest(".row")) + step];
   event.preventDefault();
   (next ?? (step < 0 ? $(`#list-${state.tab} input[type="search"]`) : null))?.focus();
+}
+
+function isReachable(row) {
+  return !row.hidden && !row.closest("details:not([open])");
 }
 
 function nodeList(side, { chooseNode }) {
@@ -120,7 +130,7 @@ function panelSection(panel, { follow }) {
     const [name, ...others] = cells;
     const columns = [
       make("span", { class: "name" }, name),
-      level ? make("span", { class: "level dim" }, level) : null,
+      level ? make("span", { class: "dim" }, level) : null,
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
       text ? make("span", { class: "text" }, text) : null,
       advice ? make("span", { class: "text dim" }, ...unbroken(advice)) : null,

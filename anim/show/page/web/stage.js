@@ -32,7 +32,7 @@ export class Stage {
     });
     this.radius = 1;
     this.cell = 1;
-    this.framed = ""; // camera that frames everything, as text
+    this.framed = ""; // camera that frames everything, as text, and what it frames
   }
 
   get shown() {
@@ -54,7 +54,7 @@ export class Stage {
     this.controls.target.copy(center);
     this.controls.maxDistance = distance * 10;
     this.controls.update();
-    this.framed = this.#camera;
+    this.framed = `${this.#camera} ${this.#subject}`;
     this.cell = roundDown(this.radius / 2);
     for (const mesh of this.floors) {
       mesh.scale.setScalar(this.radius * FLOOR_RADII);
@@ -79,9 +79,13 @@ export class Stage {
     this.controls.update();
   }
 
-  /** Position and target of the camera for the address: "x,y,z,x,y,z"; "" while it frames everything. */
+  /** Position and target of the camera for the address: "x,y,z,x,y,z"; "" while it frames the clip and side shown. */
   get cameraText() {
-    return this.#camera === this.framed ? "" : this.#camera;
+    return `${this.#camera} ${this.#subject}` === this.framed ? "" : this.#camera;
+  }
+
+  get #subject() {
+    return `${state.clip} ${this.shown.length}`;
   }
 
   get #camera() {

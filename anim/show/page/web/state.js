@@ -73,9 +73,9 @@ export function readHash(defaults) {
 
 let timer = 0;
 
-/** What follows the page in its URL, "#clip=…"; parameters without a value are left out. */
+/** What follows the page in its URL, "#clip=…"; parameters that are null are left out. */
 export function hashText(parameters) {
-  const hash = new URLSearchParams(Object.entries(parameters).filter(([, value]) => value));
+  const hash = new URLSearchParams(Object.entries(parameters).filter(([, value]) => value !== null));
   return `#${hash.toString().replaceAll("%2C", ",")}`;
 }
 

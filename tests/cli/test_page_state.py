@@ -1,0 +1,88 @@
+"""State of pages in Chromium: the address keeps it, and lists and legend follow it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anim.gltf.io import container
+from tests.browser import evaluate, needs_browser
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import built
+from tests.cli.test_table import renamed
+
+pytestmark = [pytest.mark.slow, needs_browser]
+ROWS = "[...document.querySelectorAll('#list-report button.row')]"
+DOWN = "(document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowDown', bubbles: true })), true)"
+
+
+def test_the_address_keeps_lists_and_empty_choices(call: Call, tmp_path: Path) -> None:
+    """A list beside curves without a node; nothing shown and no node, on a page that begins with both."""
+    (tmp_path / "a.glb").write_bytes(built("biped"))
+    page = tmp_path / "a.html"
+    call("view", tmp_path / "a.glb", "-o", page, "--show", "bones,curves", "--node", "#3").product()
+    cleared = "(player.update({ node: null, show: new Set() }), player.address())"
+    chosen = "(player.update({ tab: 'clips' }), player.address())"
+    (begun, without, listed) = evaluate(
+        page,
+        [
+            ("", ["player.state.node", cleared]),
+            ("#node=&show=", ["player.state.node", "player.state.show.size"]),
+            ("#node=&show=curves", ["player.state.tab", chosen]),
+        ],
+    )
+    assert begun[0] == 3
+    assert {"node=", "show="} <= set(begun[1].strip("#").split("&"))
+    assert without == [None, 0]
+    assert listed[0] == "nodes"
+    assert evaluate(page, [(listed[1], ["player.state.tab"])]) == [["clips"]]
+
+
+def test_a_clip_whose_name_another_has(call: Call, tmp_path: Path) -> None:
+    path, page = tmp_path / "a.glb", tmp_path / "a.html"
+    path.write_bytes(renamed(built("biped"), ["walk", "walk"]))
+    call("view", path, "-o", page).product()
+    ((address,),) = evaluate(page, [("#clip=%231", ["player.address()"])])
+    assert evaluate(page, [(address, ["player.state.clip"])]) == [[1]]
+
+
+def test_arrows_leave_out_folded_rows_and_show_those_below_the_filter(
+    fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    page = tmp_path / "a.html"
+    call("inspect", fixture("biped"), "--html", page).product()
+    folded = f"{ROWS}.find((row) => row.closest('details'))"
+    before = f"{ROWS}[{ROWS}.indexOf({folded}) - 1]"
+    behind = f"{ROWS}.find((row, i) => i > {ROWS}.indexOf({folded}) && !row.closest('details'))"
+    row = "document.querySelector('[data-node]:nth-of-type(2)')"
+    margin = f"parseFloat(getComputedStyle({row}).scrollMarginTop)"
+    filter_px = "document.querySelector('#list-nodes .filter').offsetHeight"
+    ((there, is_below),) = evaluate(
+        page,
+        [
+            (
+                "#list=report",
+                [
+                    f"({before}.focus(), {DOWN}, document.activeElement === ({behind} ?? {before}))",
+                    f"(player.update({{ tab: 'nodes' }}), {margin} >= {filter_px})",
+                ],
+            )
+        ],
+    )
+    assert there
+    assert is_below
+
+
+def test_no_legend_of_heat_beside_a_clip_that_the_other_file_lacks(call: Call, tmp_path: Path) -> None:
+    document = container.read(np.frombuffer(built("biped"), np.uint8))
+    whole, part, page = tmp_path / "a.glb", tmp_path / "b.glb", tmp_path / "ab.html"
+    whole.write_bytes(built("biped"))
+    shorter = replace(document, json={**document.json, "animations": document.json["animations"][:1]})
+    part.write_bytes(b"".join(piece.tobytes() for piece in container.glb(shorter)))
+    call("view", whole, part, "-o", page, "--show", "heat").product()
+    shown = "!document.querySelector('#legend').hidden"
+    codes = [f"(player.chooseClip({clip}), {shown})" for clip in (0, 1, 0)]
+    assert evaluate(page, [("", codes)]) == [[True, False, True]]
