@@ -7,9 +7,10 @@ import numpy as np
 from anim.model import Clip, Interpolation, Skeleton
 from anim.sampling.sample import sample
 from anim.simulation.rigid_bodies.assembly import ancestors
+from anim.simulation.rigid_bodies.extents import body_extent, smallest_radius
 from anim.simulation.rigid_bodies.loop import BLEND_S
 from anim.simulation.rigid_bodies.motion import RigidMotion
-from anim.simulation.rigid_bodies.rapier.world import PLANE_REACH_M, find_approximations
+from anim.simulation.rigid_bodies.rapier.world import find_approximations, plane_reach
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 
 MIN_OVERLAP_PER_RADIUS = 0.02  # of the smaller body; less is the tolerance of contacts
@@ -51,7 +52,7 @@ def _without_colliders(rigid: RigidScene, skeleton: Skeleton) -> list[str]:
 def _overlaps(rigid: RigidScene, skeleton: Skeleton, motion: RigidMotion) -> list[str]:
     found = []
     for first, second, depth in motion.overlaps:
-        radius = min(rigid.bodies[i].radius or 1e9 for i in (first, second))
+        radius = min(body_extent(rigid.bodies[i]).radius or 1e9 for i in (first, second))
         if depth > MIN_OVERLAP_PER_RADIUS * radius:
             names = [
                 skeleton.label(rigid.bodies[i].node) if rigid.bodies[i].node >= 0 else "the floor"
@@ -68,9 +69,10 @@ def _far(rigid: RigidScene, motion: RigidMotion) -> list[str]:
     if "plane" not in shapes or not {"hull", "mesh"} & set(shapes):
         return []
     apart = np.linalg.norm(motion.positions - motion.positions[0].mean(axis=0), axis=-1).max(initial=0.0)
-    return [f"a body is {apart:.0f} m from the others' start: planes end at {PLANE_REACH_M:.0f} m for hulls"] * bool(
-        apart > PLANE_REACH_M
-    )
+    reach = plane_reach(rigid)
+    if apart <= reach:
+        return []
+    return [f"a body is {apart:.3g} m from the others' start: planes end at {reach:.3g} m for hulls"]
 
 
 def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
@@ -98,7 +100,7 @@ def _jumps(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
             continue
         places = world[:, body.node, :, 3]
         jumps = np.linalg.norm(places[1::2] - places[::2], axis=1)
-        if jumps.max() > MIN_JUMP_PER_RADIUS * body.radius:
+        if jumps.max() > MIN_JUMP_PER_RADIUS * body_extent(body).radius:
             worst = int(jumps.argmax())
             found.append(
                 f"{skeleton.label(body.node)} jumps by {jumps[worst]:.3g} m at {at[worst]:.3g} s (STEP keys): bodies "
@@ -108,8 +110,7 @@ def _jumps(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
 
 
 def _seam(rigid: RigidScene, motion: RigidMotion, seam: float) -> list[str]:
-    radii = [rigid.bodies[i].radius for i in rigid.moving if rigid.bodies[i].radius > 0]
-    if seam <= MAX_SEAM_PER_RADIUS * min(radii, default=0.0):
+    if seam <= MAX_SEAM_PER_RADIUS * smallest_radius(rigid, 0.0):
         return []
     rounds = f"{motion.num_rounds} rounds of the clip"
     return [f"bodies don't repeat their motion in {rounds}: the last {BLEND_S:g} s move them {seam:.3g} m to the start"]

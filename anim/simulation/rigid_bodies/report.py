@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.simulation.report import RunHistory, SimulationReport, advise_half_step
+from anim.simulation.rigid_bodies.extents import smallest_radius
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.rigid_scene import BodyKind, Frame, RigidScene
@@ -77,8 +80,8 @@ def _advice(rigid: RigidScene, motion: RigidMotion, steps: Steps, first_bad_step
     finer = advise_half_step(steps.step_s)
     if first_bad_step is not None:
         return f"the simulation diverges at step {first_bad_step}: {finer}"
-    radii = [rigid.bodies[i].radius for i in rigid.moving if rigid.bodies[i].radius > 0]
-    if radii and not motion.overlaps and motion.penetration > PENETRATION_PER_RADIUS * min(radii):
+    deepest = PENETRATION_PER_RADIUS * smallest_radius(rigid, math.inf)
+    if not motion.overlaps and motion.penetration > deepest:
         return f"bodies are up to {1000 * motion.penetration:.3g} mm inside others: {finer}"
     return ""
 

@@ -11,22 +11,47 @@ from dataclasses import replace
 
 import numpy as np
 
+from anim.arrays import Floats
 from anim.simulation.rigid_bodies.description import JointDrive, JointLimit, Motion, Vector
+from anim.simulation.rigid_bodies.extents import center_in_scene, smallest_radius
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, Frame, RigidBody, RigidJoint, RigidScene
 from anim.simulation.rigid_bodies.shapes import scale_shape
 
 MIN_RADIUS_M = 0.0625  # of the smallest moving body, below which a scene is enlarged; hulls fail at a third of it
 ENLARGED_RADIUS_UNITS = 0.25  # at least, of that body then
 MAX_UNITS_PER_METRE = 1024.0
+MIN_PLANE_REACH_M = 500.0  # half the size of the box that stands for a plane where hulls fall
+MAX_PLANE_REACH_UNITS = 8000.0  # at 32 000 Rapier lets hulls sink into it
+PLANE_REACH_PER_SPREAD = 4.0  # of the bodies at the start; they move farther
 
 
 def choose_unit(scene: RigidScene) -> float:
     """Return length units per metre: 1, or for small moving bodies the power of two that makes them large enough."""
-    radii = [scene.bodies[i].radius for i in scene.moving if scene.bodies[i].radius > 0]
-    least = min(radii, default=1.0)
+    least = smallest_radius(scene, 1.0)
     if least >= MIN_RADIUS_M:
         return 1.0
-    return min(2.0 ** math.ceil(math.log2(ENLARGED_RADIUS_UNITS / least)), MAX_UNITS_PER_METRE)
+    most = MAX_PLANE_REACH_UNITS / (PLANE_REACH_PER_SPREAD * max(_spread(scene), 1.0))
+    exponent = min(math.ceil(math.log2(ENLARGED_RADIUS_UNITS / least)), math.floor(math.log2(most)))
+    return min(max(2.0**exponent, 1.0), MAX_UNITS_PER_METRE)
+
+
+def plane_reach(scene: RigidScene) -> float:
+    """Return the distance in metres from the bodies to the end of a plane where hulls fall. scene: in metres."""
+    units = choose_unit(scene)
+    wanted = units * max(MIN_PLANE_REACH_M, PLANE_REACH_PER_SPREAD * _spread(scene))
+    return min(wanted, MAX_PLANE_REACH_UNITS) / units
+
+
+def scene_center(scene: RigidScene) -> Floats:
+    """Return the mean position (3,) m of the moving bodies at the start."""
+    centers = [center_in_scene(scene.bodies[i]) for i in scene.moving]
+    return np.asarray(np.mean(centers, axis=0)) if centers else np.zeros(3)
+
+
+def _spread(scene: RigidScene) -> float:
+    """Largest distance in metres of a moving body from the middle of all."""
+    center = scene_center(scene)
+    return max((float(np.linalg.norm(center_in_scene(scene.bodies[i]) - center)) for i in scene.moving), default=0.0)
 
 
 def scale_scene(scene: RigidScene, units: float) -> RigidScene:

@@ -15,16 +15,17 @@ from anim.simulation.rigid_bodies.rapier.package import load_package
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, RigidBody, RigidScene
 
 INFINITE_MASS_KG = 1e9
-PLANE_REACH_M, PLANE_DEPTH_M = 500.0, 50.0  # half the size of a plane's box; at 10 km contacts are wrong by its depth
+PLANE_DEPTH = 50.0  # half of it, of a plane's box, in length units
 CONVEX_VOLUME_FRACTION = 0.99  # of its hull, from which a mesh counts as convex
 
 
 class ShapeBuilder:
     """Builder of Rapier's shapes for the colliders of a scene, and of the masses of its bodies."""
 
-    def __init__(self, scene: RigidScene, center: Floats) -> None:
-        """center: (3,) m, near the bodies."""
+    def __init__(self, scene: RigidScene, center: Floats, reach: float, units: float) -> None:
+        """center: (3,), near the bodies. reach: half the size of a plane's box. units: of length, per metre."""
         self._rapier, self._scene, self._center = load_package(), scene, center
+        self._reach, self._units = reach, units
 
     def build(self, collider: BodyCollider, body: RigidBody) -> Any:
         """Rapier's shape. A dynamic mesh, which has no inside, becomes its hull, or convex pieces of it."""
@@ -53,8 +54,8 @@ class ShapeBuilder:
         if body.kind is BodyKind.DYNAMIC or not has_hulls:
             return make.halfspace((0.0, 1.0, 0.0))
         x, z = self._beside(collider, body) if body.kind is BodyKind.STATIC else (0.0, 0.0)
-        down = self._rapier.Isometry3(translation=(x, -PLANE_DEPTH_M, z))
-        return make.compound([(down, make.cuboid(PLANE_REACH_M, PLANE_DEPTH_M, PLANE_REACH_M))])
+        down = self._rapier.Isometry3(translation=(x, -PLANE_DEPTH, z))
+        return make.compound([(down, make.cuboid(self._reach, PLANE_DEPTH, self._reach))])
 
     def _beside(self, collider: BodyCollider, body: RigidBody) -> tuple[float, float]:
         """Position of the bodies along a plane's own x and z."""
@@ -85,7 +86,8 @@ class ShapeBuilder:
         mass = motion.mass if motion.mass is not None else volume
         mass = INFINITE_MASS_KG if math.isinf(mass) else (mass or 1.0)
         factor = mass / volume if volume else 1.0
-        inertia = [factor * value for value in total.principal_inertia.to_tuple()] if volume else [mass] * 3
+        without = [mass * self._units**2] * 3  # 1 m² per kg, for bodies without a volume
+        inertia = [factor * value for value in total.principal_inertia.to_tuple()] if volume else without
         turned = total.principal_inertia_local_frame if volume else rapier.Rotation3()
         if motion.inertia_diagonal is not None:
             x, y, z, w = motion.inertia_orientation

@@ -15,17 +15,18 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.simulation.rigid_bodies.description import MAX_SPEED_M_S
+from anim.simulation.rigid_bodies.extents import body_extent, smallest_radius
 from anim.simulation.rigid_bodies.rapier.filters import interaction_groups
 from anim.simulation.rigid_bodies.rapier.frames import isometry, shape_frame
 from anim.simulation.rigid_bodies.rapier.friction import FrictionHooks
 from anim.simulation.rigid_bodies.rapier.joints import build_joint, find_approximations
-from anim.simulation.rigid_bodies.rapier.length_unit import choose_unit, scale_scene
+from anim.simulation.rigid_bodies.rapier.length_unit import choose_unit, plane_reach, scale_scene, scene_center
 from anim.simulation.rigid_bodies.rapier.package import load_package
-from anim.simulation.rigid_bodies.rapier.shapes import INFINITE_MASS_KG, PLANE_REACH_M, ShapeBuilder
+from anim.simulation.rigid_bodies.rapier.shapes import INFINITE_MASS_KG, ShapeBuilder
 from anim.simulation.rigid_bodies.rapier.slip import SlipReader
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidScene
 
-__all__ = ["PLANE_REACH_M", "RapierWorld", "find_approximations"]
+__all__ = ["RapierWorld", "find_approximations", "plane_reach"]
 
 SUBSTEPS = 4
 MAX_PENETRATION_M = 0.005  # that Rapier leaves; of small bodies MAX_PENETRATION_PER_RADIUS
@@ -39,8 +40,9 @@ class RapierWorld:
     def __init__(self, scene: RigidScene, step: float) -> None:
         self._rapier = load_package()
         self._units = choose_unit(scene)
+        reach = self._units * plane_reach(scene)
         self._scene = scene = scale_scene(scene, self._units)
-        self._center = _center(scene)
+        self._center = np.round(scene_center(scene))
         world = self._rapier.PhysicsWorld(gravity=scene.gravity)
         self._world = world
         parameters = world.integration_parameters
@@ -51,14 +53,14 @@ class RapierWorld:
         parameters.normalized_max_linear_velocity = self._units * MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
         self._groups = interaction_groups(scene)
-        self._shapes = ShapeBuilder(scene, self._center)
+        self._shapes = ShapeBuilder(scene, self._center, reach, self._units)
         materials = [each.material for body in scene.bodies for each in body.colliders]
         self._friction = FrictionHooks(materials, step, self._units)
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
         owners = {index: body for index, (body, _) in self._colliders.items()}
-        self._slip = SlipReader(world, self._bodies, [body.radius for body in scene.bodies], owners)
+        self._slip = SlipReader(world, self._bodies, [body_extent(body).radius for body in scene.bodies], owners)
         self._weighed: list[tuple[Any, float]] = []
         self._read = [self._bodies[i] for i in scene.moving]
         anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))
@@ -193,12 +195,6 @@ class RapierWorld:
         return builder.collision_groups(self._groups[collider.filter])
 
 
-def _center(scene: RigidScene) -> Floats:
-    positions = [scene.bodies[i].frame.position for i in scene.moving]
-    return np.asarray(np.round(np.mean(positions, axis=0)), np.float64) if positions else np.zeros(3)
-
-
 def _allowed_penetration(scene: RigidScene) -> float:
-    radii = [scene.bodies[i].radius for i in scene.moving if scene.bodies[i].radius > 0]
-    least = MAX_PENETRATION_PER_RADIUS * min(radii, default=1.0)
+    least = MAX_PENETRATION_PER_RADIUS * smallest_radius(scene, 1.0)
     return float(np.clip(least, MIN_PENETRATION_M, MAX_PENETRATION_M))
