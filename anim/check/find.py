@@ -21,18 +21,13 @@ def find_all(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple[Fin
     )
 
 
-def find_grouped(file: CheckedFile, selection: RuleSelection = DEFAULT) -> tuple[Finding, ...]:
-    """Return one finding per rule for those that can sum up occurrences, else one per occurrence.
-
-    Costly rules are left out.
-    """
-    return tuple(finding for finding, _ in group_occurrences(file, selection))
-
-
 def group_occurrences(
     file: CheckedFile, selection: RuleSelection = DEFAULT
 ) -> list[tuple[Finding, Sequence[Occurrence]]]:
-    """Return the findings of `find_grouped`, each with its occurrences."""
+    """Return one finding per rule that can sum up occurrences, else per occurrence, each with its occurrences.
+
+    Costly rules are left out.
+    """
     result: list[tuple[Finding, Sequence[Occurrence]]] = []
     for rule, found in occurrences(file, selection, costly=False):
         parts: Sequence[Sequence[Occurrence]] = [found] if rule.problem is not None else [[each] for each in found]

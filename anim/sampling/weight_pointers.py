@@ -49,10 +49,15 @@ def resolve_weight_pointers(skeleton: Skeleton, clip: Clip) -> Clip:
 
 
 def ineffective_weight_pointers(skeleton: Skeleton, clip: Clip) -> list[str]:
-    """Return the pointers of a clip to morph weights that there are not, or that those of all nodes replace."""
-    pointers = [i for i, track in enumerate(clip.tracks) if track.path == "pointer" and _parse(track) is not None]
-    used = {track for columns in _sources(skeleton, clip).values() for track, _ in columns} if pointers else set()
-    return list(dict.fromkeys(clip.tracks[i].pointer or "" for i in pointers if i not in used))
+    """Return the pointers of a clip to morph weights that there are not, or that those of all nodes replace.
+
+    Of two tracks of one pointer the last one counts, so the pointer itself has an effect.
+    """
+    pointers = [track.pointer or "" for track in clip.tracks if track.path == "pointer" and _parse(track) is not None]
+    if not pointers:
+        return []
+    used = {clip.tracks[i].pointer for columns in _sources(skeleton, clip).values() for i, _ in columns if i >= 0}
+    return list(dict.fromkeys(each for each in pointers if each not in used))
 
 
 def moved_nodes(skeleton: Skeleton, track: Track) -> list[int]:

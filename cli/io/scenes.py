@@ -9,7 +9,7 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.reader import INSTANCING, instanced_nodes
 from anim.gltf.validation.channel_targets import has_weight_pointers
-from anim.model import Scene, Skeleton, parse_weight_pointer
+from anim.model import Scene, Skeleton
 from anim.sampling.weight_pointers import ineffective_weight_pointers
 from anim.skinning.analysis.weight_sums import unnormalized_weights
 from cli.text import Reporter
@@ -36,25 +36,21 @@ def read_scene(
         for words in bad.in_words():
             reporter.warn(f"{name}: {words}")
     _warn_of_copies(document, name, reporter, chosen)
-    _warn_of_weight_pointers(document, found.skeleton, name, reporter)
+    _warn_of_weight_pointers(document, found.skeleton, name, reporter, accessors)
     return found
 
 
-def _warn_of_weight_pointers(document: Document, skeleton: Skeleton, name: str, reporter: Reporter) -> None:
+def _warn_of_weight_pointers(
+    document: Document, skeleton: Skeleton, name: str, reporter: Reporter, accessors: Accessors | None
+) -> None:
     if not has_weight_pointers(document.json):
         return
-    clips, _ = reader.readable_clips(document, Accessors(document))
+    clips, _ = reader.readable_clips(document, accessors or Accessors(document))
     found = [pointer for clip in clips.values() for pointer in ineffective_weight_pointers(skeleton, clip)]
     for pointer in dict.fromkeys(found):
-        reporter.warn(f"{name}: the pointer '{pointer}' moves nothing: {_why_ineffective(skeleton, pointer)}")
-
-
-def _why_ineffective(skeleton: Skeleton, pointer: str) -> str:
-    target = parse_weight_pointer(pointer)
-    meshes = {each.mesh: len(each.weights) for each in skeleton.morphed}
-    if target is None or target.owner != "meshes" or (target.target or 0) >= meshes.get(target.index, 0):
-        return "no node has such morph weights"
-    return "all nodes with this mesh have weights of their own, which replace the mesh's"
+        reporter.warn(
+            f"{name}: the pointer '{pointer}' moves nothing: no node has such morph weights, or others replace them"
+        )
 
 
 def _warn_of_copies(document: Document, name: str, reporter: Reporter, chosen: Collection[int] | None) -> None:

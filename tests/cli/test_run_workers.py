@@ -111,7 +111,7 @@ def test_a_worker_that_is_ended_costs_nothing(how: signal.Signals, crowd: Path) 
         (signal.SIGKILL, ()),
         pytest.param(signal.SIGKILL, ("--no-cache",), marks=pytest.mark.slow),
         pytest.param(signal.SIGTERM, (), marks=pytest.mark.slow),
-        pytest.param(signal.SIGINT, ("--no-cache",), marks=pytest.mark.slow),
+        (signal.SIGINT, ("--no-cache",)),
     ],
 )
 def test_a_run_that_is_ended_leaves_nothing_half_written_and_resumes(

@@ -13,7 +13,7 @@ import numpy as np
 from anim.caches import frame_blocks, rest_mesh
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.storage import Inputs, Outputs, read_exactly
-from anim.errors import FormatError
+from anim.errors import DataRangeError, FormatError
 from anim.model import VertexCache
 
 HEADER = struct.Struct(">ii")
@@ -40,10 +40,17 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write the cache and its rest mesh; times become float32."""
+    """Write the cache and its rest mesh; times become float32. Raises DataRangeError where two become equal."""
+    times = cache.times.astype(">f4")
+    if len(equal := np.flatnonzero(np.diff(times) <= 0)):
+        i = int(equal[0])
+        raise DataRangeError(
+            f"frames {i} and {i + 1}, {cache.times[i + 1] - cache.times[i]:.3g} s apart, are at one time in float32",
+            help="choose a frame rate with --fps",
+        )
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))
-        file.write(cache.times.astype(">f4").tobytes())
+        file.write(times.tobytes())
         mark = frame_blocks.write(cache, file, ">f4")
     rest_mesh.write(cache, outputs, writing.rest_mesh, mark)
     return WriteResult()

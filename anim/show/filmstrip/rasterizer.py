@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -33,17 +33,27 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
     first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
     last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
     rows = np.maximum(last - first + 1, 0)
-    ends = np.cumsum(rows)
-    start = 0
-    while start < len(chosen):
-        done = int(ends[start - 1]) if start else 0
-        stop = max(int(np.searchsorted(ends, done + MAX_BATCH_ROWS, side="right")), start + 1)
-        some = slice(start, stop)
-        which = np.repeat(np.arange(start, stop), rows[some])
-        line = first[which] + np.arange(len(which)) - np.repeat(ends[some] - rows[some] - done, rows[some])
-        _draw(which, line, shares, near, chosen, seen, nearest, width, alpha_test)
-        start = stop
+    for some in _batches(rows, MAX_BATCH_ROWS):
+        owner, line = _expand(first[some], rows[some])
+        _draw(owner + some.start, line, shares, near, chosen, seen, nearest, width, alpha_test)
     return seen.reshape(height, width)
+
+
+def _batches(counts: Ints, most: int) -> Iterator[slice]:
+    """Slices of consecutive spans of at most so many elements in all, or of one span. counts: (S,), of each span."""
+    ends = np.cumsum(counts)
+    start = 0
+    while start < len(counts):
+        done = int(ends[start - 1]) if start else 0
+        stop = max(int(np.searchsorted(ends, done + most, side="right")), start + 1)
+        yield slice(start, stop)
+        start = stop
+
+
+def _expand(first: Ints, counts: Ints) -> tuple[Ints, Ints]:
+    """Index of the span, and the element itself, of all elements of spans from `first` on."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, first[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _planes(corners: Floats) -> tuple[Floats, Floats, Ints]:
@@ -88,13 +98,8 @@ def _draw(
     first = np.clip(np.ceil(low - 0.5 - EDGE_TOLERANCE_PX), 0, width).astype(np.int64)
     last = np.clip(np.floor(high - 0.5 + EDGE_TOLERANCE_PX), -1, width - 1).astype(np.int64)
     counts = np.maximum(last - first + 1, 0)
-    ends = np.cumsum(counts)
-    start = 0
-    while start < len(which):
-        done = int(ends[start - 1]) if start else 0
-        some = slice(start, max(int(np.searchsorted(ends, done + MAX_BATCH_PIXELS, side="right")), start + 1))
+    for some in _batches(counts, MAX_BATCH_PIXELS):
         _draw_pixels(which[some], line[some], first[some], counts[some], near, chosen, seen, nearest, width, alpha_test)
-        start = some.stop
 
 
 def _draw_pixels(
@@ -110,8 +115,7 @@ def _draw_pixels(
     alpha_test: AlphaTest | None,
 ) -> None:
     """Draw `counts` pixels from column `first` on of rows `line` of triangles `which`."""
-    row = np.repeat(np.arange(len(which)), counts)
-    x = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    row, x = _expand(first, counts)
     plane = near[which]
     level = plane[:, 1] * (line + 0.5) + plane[:, 2] + plane[:, 0] * 0.5
     depth = level[row] + plane[row, 0] * x

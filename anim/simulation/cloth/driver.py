@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.model import Clip, MeshInstance, Scene
+from anim.model import Clip, Scene
 from anim.sampling.sample import sample
 from anim.simulation.cloth.colliders import Obstacle, place_obstacles
+from anim.skinning.analysis.extreme_vertices import keep_vertices
 from anim.skinning.bake import Baker, prepare_bake
 
 
@@ -75,25 +76,5 @@ def bake_vertices(scene: Scene, node: int, vertices: Ints) -> Baker | None:
     """Return the baker of some vertices (N,) of the mesh of a node, None for no vertices: cheap at every substep."""
     if not len(vertices):
         return None
-    instances = [_select(each, vertices) for each in scene.instances if each.node == node]
-    return prepare_bake(replace(scene, instances=tuple(instances)), rigid=True, nodes=[node], threads=1)
-
-
-def _select(instance: MeshInstance, vertices: Ints) -> MeshInstance:
-    """The mesh instance with some of its vertices (N,), and without faces and directions."""
-    mesh = instance.mesh
-    selected = replace(
-        mesh,
-        positions=mesh.positions[vertices],
-        faces=np.zeros((0, 3), np.int64),
-        joints=mesh.joints[vertices],
-        weights=mesh.weights[vertices],
-        targets=mesh.targets[:, vertices],
-        normals=None,
-        normal_targets=None,
-        primitives=(),
-        tangents=None,
-        tangent_targets=None,
-        weight_sums=None,
-    )
-    return replace(instance, mesh=selected)
+    meshes = [replace(each, mesh=keep_vertices(each.mesh, vertices)) for each in scene.instances if each.node == node]
+    return prepare_bake(replace(scene, instances=tuple(meshes)), rigid=True, nodes=[node], threads=1)

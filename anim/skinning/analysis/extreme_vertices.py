@@ -14,7 +14,11 @@ MIN_VERTICES = 64  # of a mesh; smaller ones stay whole
 
 def reduce_scene(scene: Scene, nodes: frozenset[int]) -> Scene:
     """Return a scene of the meshes on these nodes, with extreme vertices only, and without faces and normals."""
-    reduced = [replace(each, mesh=_reduce(each.mesh)) for each in scene.instances if each.node in nodes]
+    reduced = [
+        replace(each, mesh=keep_vertices(each.mesh, extreme_vertices(each.mesh)))
+        for each in scene.instances
+        if each.node in nodes
+    ]
     return Scene(scene.skeleton, tuple(reduced))
 
 
@@ -42,8 +46,8 @@ def extreme_vertices(mesh: Mesh) -> Ints:
     return np.unique(np.concatenate(chosen))
 
 
-def _reduce(mesh: Mesh) -> Mesh:
-    kept = extreme_vertices(mesh)
+def keep_vertices(mesh: Mesh, kept: Ints) -> Mesh:
+    """Return a mesh of some vertices (N,), with skin and morph targets, and without faces and directions."""
     return Mesh(
         mesh.name,
         mesh.positions[kept],

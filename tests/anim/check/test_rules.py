@@ -10,7 +10,7 @@ import pytest
 
 from anim.arrays import Floats
 from anim.check.checked_file import CheckedFile
-from anim.check.find import find_all, find_grouped
+from anim.check.find import find_all, group_occurrences
 from anim.check.finding import Finding, Occurrence
 from anim.check.fixing import fix_all
 from anim.check.registry import RULES
@@ -210,15 +210,15 @@ def test_eight_active_targets_are_promised() -> None:
 def test_costly_rules_are_left_to_check() -> None:
     file = broken("GA209")
     assert find_all(file, selection("GA209"))
-    assert find_grouped(file, selection("GA209")) == ()
+    assert group_occurrences(file, selection("GA209")) == []
 
 
 def test_clips_are_summed_up_where_a_rule_can() -> None:
     file = checked(opened_fixture("noop"))
-    grouped, single = find_grouped(file, selection("GA111")), find_all(file, selection("GA111"))
+    grouped, single = group_occurrences(file, selection("GA111")), find_all(file, selection("GA111"))
     assert len(grouped) == 1
     assert len(single) > 1
-    assert grouped[0].where.startswith("clips '")
+    assert grouped[0][0].where.startswith("clips '")
 
 
 def test_gaps_of_the_size_of_the_model_have_no_exponent() -> None:

@@ -113,6 +113,13 @@ def test_pointers_to_no_weights_move_nothing(pointer: str) -> None:
     assert ineffective_weight_pointers(NODES, clip) == [pointer]
 
 
+@pytest.mark.parametrize("pointer", ["/meshes/4/weights/1", "/nodes/0/weights/1"])
+def test_two_tracks_of_one_pointer_are_not_ineffective(pointer: str) -> None:
+    clip = Clip("", (_pointer(pointer, 1), _pointer(pointer, 1, times=(1, 2, 4))))
+    assert ineffective_weight_pointers(NODES, clip) == []
+    np.testing.assert_array_equal(resolve_weight_pointers(NODES, clip).tracks[-1].times, (1, 2, 4))
+
+
 def test_weights_of_nodes_replace_those_of_their_mesh() -> None:
     own = replace(NODES, morphed=(MORPHED[2],))
     clip = Clip("", (_pointer("/meshes/4/weights", 3), _pointer("/materials/0/alphaCutoff", 1)))

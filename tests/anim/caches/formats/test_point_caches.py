@@ -10,7 +10,7 @@ import pytest
 from anim.caches.options import ReadOptions, WriteOptions
 from anim.caches.storage import Memory
 from anim.caches.transforms.up_axis import to_up_axis
-from anim.errors import FormatError, RangeError
+from anim.errors import DataRangeError, FormatError, RangeError
 from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import FACES, by_trimesh, cache, normals_of, opened, positions_of, written
 
@@ -49,6 +49,13 @@ def test_mdd_by_numpy() -> None:
     assert np.frombuffer(data[:8], ">i4").tolist() == [7, 9]
     assert np.frombuffer(data[8:36], ">f4") == pytest.approx(source.times)
     assert (np.frombuffer(data[36:], ">f4").reshape(7, 9, 3) == positions_of(source)).all()
+
+
+def test_mdd_has_no_two_frames_at_one_time_in_float32() -> None:
+    """Found by fuzzing: the reader refused what was written."""
+    close = from_arrays(np.array([0.0, 1e-243]), np.zeros((2, 1, 3), np.float32), np.empty((0, 3), np.int64))
+    with pytest.raises(DataRangeError, match="frames 0 and 1, 1e-243 s apart, are at one time in float32"):
+        written(close, "a.mdd", WriteOptions(rest_mesh=""))
 
 
 @pytest.mark.parametrize("name", ["walk.pc2", "walk.mdd"])

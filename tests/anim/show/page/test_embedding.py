@@ -132,6 +132,7 @@ def test_weights_of_a_mesh_stay_a_pointer_where_a_node_has_its_own() -> None:
     target["extensions"]["KHR_animation_pointer"]["pointer"] = "/meshes/0/weights"
     found = embed(document)
     assert found.notes[0].startswith("4 tracks not shown")
+    assert found.notes[0].endswith(" and 1 more")
 
 
 def test_pointers_become_plain_channels() -> None:
