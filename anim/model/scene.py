@@ -80,6 +80,18 @@ class Mesh:
         if self.faces.size and int(self.faces.max()) >= len(self.positions):
             raise FormatError(f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=where)
 
+    def keep_vertices(self, kept: Ints) -> Mesh:
+        """Return a mesh of some vertices (N,), with skin and morph targets, and without faces and directions."""
+        return Mesh(
+            self.name,
+            self.positions[kept],
+            np.empty((0, 3), np.int64),
+            self.joints[kept],
+            self.weights[kept],
+            self.targets[:, kept],
+            self.rest_weights,
+        )
+
     def __repr__(self) -> str:
         counts = f"vertices={len(self.positions)}, faces={len(self.faces)}, targets={len(self.targets)}"
         return f"Mesh({self.name!r}, {counts})"

@@ -46,7 +46,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
         i = int(equal[0])
         raise DataRangeError(
             f"frames {i} and {i + 1}, {cache.times[i + 1] - cache.times[i]:.3g} s apart, are at one time in float32",
-            help="choose a frame rate with --fps",
+            help="choose a frame rate with `fps`",
         )
     with outputs.create(outputs.main) as file:
         file.write(HEADER.pack(cache.frame_count, cache.vertex_count))

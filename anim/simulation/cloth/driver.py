@@ -11,7 +11,6 @@ from anim.arrays import Floats, Ints
 from anim.model import Clip, Scene
 from anim.sampling.sample import sample
 from anim.simulation.cloth.colliders import Obstacle, place_obstacles
-from anim.skinning.analysis.extreme_vertices import keep_vertices
 from anim.skinning.bake import Baker, prepare_bake
 
 
@@ -76,5 +75,5 @@ def bake_vertices(scene: Scene, node: int, vertices: Ints) -> Baker | None:
     """Return the baker of some vertices (N,) of the mesh of a node, None for no vertices: cheap at every substep."""
     if not len(vertices):
         return None
-    meshes = [replace(each, mesh=keep_vertices(each.mesh, vertices)) for each in scene.instances if each.node == node]
+    meshes = [replace(each, mesh=each.mesh.keep_vertices(vertices)) for each in scene.instances if each.node == node]
     return prepare_bake(replace(scene, instances=tuple(meshes)), rigid=True, nodes=[node], threads=1)

@@ -15,7 +15,7 @@ MIN_VERTICES = 64  # of a mesh; smaller ones stay whole
 def reduce_scene(scene: Scene, nodes: frozenset[int]) -> Scene:
     """Return a scene of the meshes on these nodes, with extreme vertices only, and without faces and normals."""
     reduced = [
-        replace(each, mesh=keep_vertices(each.mesh, extreme_vertices(each.mesh)))
+        replace(each, mesh=each.mesh.keep_vertices(extreme_vertices(each.mesh)))
         for each in scene.instances
         if each.node in nodes
     ]
@@ -44,16 +44,3 @@ def extreme_vertices(mesh: Mesh) -> Ints:
     if len(mesh.targets):
         chosen.append(np.einsum("mvi,mvi->mv", mesh.targets, mesh.targets).argmax(axis=1))
     return np.unique(np.concatenate(chosen))
-
-
-def keep_vertices(mesh: Mesh, kept: Ints) -> Mesh:
-    """Return a mesh of some vertices (N,), with skin and morph targets, and without faces and directions."""
-    return Mesh(
-        mesh.name,
-        mesh.positions[kept],
-        np.empty((0, 3), np.int64),
-        mesh.joints[kept],
-        mesh.weights[kept],
-        mesh.targets[:, kept],
-        mesh.rest_weights,
-    )
