@@ -23,7 +23,8 @@ from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.measure.compare import diff as compare
 from anim.measure.compare.diff import Diff
-from anim.measure.error.metric import FPS, ErrorMetric
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import FPS
 from anim.measure.error.surface import diagonal
 from anim.model import Clip
 from anim.operations.selection import Selection, match_names

@@ -13,7 +13,8 @@ from anim.arrays import Floats
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.measure.error.metric import SLACK, ErrorMetric, key_and_mid_times
+from anim.measure.error.metric import SLACK, ErrorMetric
+from anim.measure.error.sample_times import key_and_mid_times
 from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, Scene
 from anim.operations.resample import resample

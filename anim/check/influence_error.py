@@ -9,7 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.surface import Surface, morph_points, skin_points, surfaces
 from anim.model import Clip
 from anim.sampling.pose import PosedSkeleton

@@ -9,15 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, unique_sorted
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
-from anim.measure.error.metric import (
-    NOISE,
-    SAME_MOMENT,
-    ErrorMetric,
-    MotionError,
-    cut_times,
-    dense_times,
-    key_and_mid_times,
-)
+from anim.measure.error.metric import NOISE, ErrorMetric, MotionError
+from anim.measure.error.sample_times import SAME_MOMENT, cut_times, dense_times, key_and_mid_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Interpolation
 from anim.optimization.options import PLAYERS, Bounds, Reference

@@ -18,7 +18,8 @@ from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
 from anim.measure.compare.name_matching import ambiguous_names, match_by_name
-from anim.measure.error.metric import FPS, ErrorMetric
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import FPS
 from anim.measure.error.surface import diagonal, is_measured_at
 from anim.measure.inspect.storage_cost import StorageCost, storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes

@@ -8,7 +8,7 @@ from anim.caches.registry import READABLE
 from anim.caches.storage import suffix
 from anim.errors import AnimError
 from anim.gltf.reading import reader
-from anim.measure.error.metric import FPS
+from anim.measure.error.sample_times import FPS
 from anim.operations.selection import Selection
 from anim.show.page.comparison import vertex_content
 from cli.errors import UsageError

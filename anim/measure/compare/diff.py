@@ -13,7 +13,8 @@ from anim.measure.compare import name_matching
 from anim.measure.compare.correspondence import Correspondence
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.equal_clips import first_equal
-from anim.measure.error.metric import FPS, ErrorMetric, MotionError, dense_times
+from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.sample_times import FPS, dense_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
-from anim.measure.error.metric import NOISE, cut_times
+from anim.measure.error.metric import NOISE
+from anim.measure.error.sample_times import cut_times
 from anim.model import Clip, Interpolation
 
 

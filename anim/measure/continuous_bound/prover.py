@@ -78,7 +78,7 @@ class Prover:
         It is above the largest sample by at most `slack`, as a fraction of it, unless intervals between times would
         need too many subdivisions, or the metric's skeletons have hundreds of levels.
         times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key, such as those
-        of `metric.dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
+        of `dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
         largest sample. floor: m, bounds below it are not refined. longest: s, as for `interval_rise`.
         Nothing is proven for scenes with different hierarchies, for players other than those of PLAYERS, or if
         quaternions pass through zero or rotate too far between two times.

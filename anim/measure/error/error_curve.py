@@ -8,7 +8,8 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
-from anim.measure.error.metric import FPS, ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import FPS, dense_times
 from anim.model import Clip
 
 JOINTS = 4  # number of worst joints with a curve of their own

@@ -6,7 +6,6 @@ the length of a clip.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import starmap
@@ -23,21 +22,18 @@ from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.reduced_skeleton import ReducedSkeleton, reduce_skeletons
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
 from anim.measure.error.surface import Surface, diagonal, has_vertices, surfaces
-from anim.model import Clip, Interpolation, Pose, Scene, Skeleton
-from anim.model.time_axis import merge_times
+from anim.model import Clip, Pose, Scene, Skeleton
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PosedSkeleton, PoseSampler
-from anim.sampling.times import check_fps, frame_times
 from anim.sampling.weight_pointers import resolve_weight_pointers
 
 NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no vertex is searched
 SLACK = 1.001  # factor: a bound this close to a found error is not refined
 MAX_SEARCHED = 40_000_000  # vertices per surface and block; if there are more, the bound of the rest is reported
 BLOCK = 40_000  # matrices of nodes per block, each about 600 bytes with derived values
-SAME_MOMENT = 1e-6  # s; closer times are equal, written as float32 and as float64
-FPS = 120.0  # fps of the grid for motion between keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +148,7 @@ class ErrorMetric:
         return (before, after) if self._reduced is None else (self._reduced.clip(before), self._reduced.clip(after))
 
     def error(self, before: Clip, after: Clip, *, player: str = "spec") -> MotionError:
-        """Return the error of `after` at the times of `dense_times`.
+        """Return the error of `after` at the times of `sample_times.dense_times`.
 
         Between them it may be larger: `anim.measure.continuous_bound.largest_error` bounds it there too.
         """
@@ -292,52 +288,3 @@ def _round_up(values: Floats) -> NDArray[np.float32]:
     """The values rounded up to float32."""
     near = values.astype(np.float32)
     return np.where(near < values, np.nextafter(near, np.float32(np.inf)), near)
-
-
-def key_and_mid_times(*clips: Clip) -> Floats:
-    """Return every key time of the clips and the middle of every interval, in seconds, increasing."""
-    keys = _key_times(clips)
-    return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
-
-
-def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
-    """Return key and mid times, a grid of `fps` frames per second, and the moments before STEP keys.
-
-    In seconds, increasing. The grid includes 0 s, and starts with the last frame before the first key, which is equal
-    to all earlier ones. Frames that differ from a key by rounding are that key.
-    """
-    check_fps(fps)
-    end = max((clip.end for clip in clips), default=0.0)
-    keys = key_and_mid_times(*clips)
-    frames = frame_times(max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps, end, fps=fps)
-    after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
-    apart = np.minimum(np.abs(keys[after] - frames), np.abs(frames - keys[np.maximum(after - 1, 0)]))
-    return unique_sorted(np.concatenate((keys, frames[apart > SAME_MOMENT], *_before_jumps(clips))))
-
-
-def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
-    """Return the clips' key times, the moments before STEP keys, and divisions of all intervals.
-
-    In seconds, increasing. Each interval between neighboring keys is divided into equal parts. parts: minimum number of
-    parts of an interval, ≥ 1. step: s, maximum duration of a part; > 0.
-    """
-    keys = _key_times(clips)
-    gaps = np.diff(keys)
-    counts = np.maximum(np.ceil(gaps / step).astype(np.int64), parts)
-    gap = np.repeat(np.arange(len(gaps)), counts)
-    part = np.arange(len(gap)) - np.repeat(np.cumsum(counts) - counts, counts)
-    within = keys[gap] + gaps[gap] * (part / counts[gap])
-    return unique_sorted(np.concatenate((within, keys[-1:], *_before_jumps(clips))))
-
-
-def _key_times(clips: Sequence[Clip]) -> Floats:
-    """All key times of the clips, increasing; 0 without tracks."""
-    keys = merge_times(axis for clip in clips for axis in clip.time_axes)
-    return keys if len(keys) else np.zeros(1)
-
-
-def _before_jumps(clips: Sequence[Clip]) -> list[Floats]:
-    """The last moments before STEP keys, where the error can be as large as the jump."""
-    steps = (track for clip in clips for track in clip.tracks if track.interpolation is Interpolation.STEP)
-    axes = dict.fromkeys(track.time_axis for track in steps if len(track.times) > 1)
-    return [np.nextafter(axis.times[1:], 0) for axis in axes]

@@ -11,8 +11,9 @@ from anim.arrays import Floats, Ints
 from anim.maths import hierarchy, quaternion
 from anim.measure.error.displacement import lengths_by_group, max_displacement
 from anim.measure.error.merged_groups import MergedGroups
-from anim.measure.error.metric import FPS, MAX_SEARCHED, Block, ErrorMetric, dense_times
+from anim.measure.error.metric import MAX_SEARCHED, Block, ErrorMetric
 from anim.measure.error.point_groups import PointGroups
+from anim.measure.error.sample_times import FPS, dense_times
 from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.times import frame_times

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import Drop, Packing, Policy

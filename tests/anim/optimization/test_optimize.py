@@ -12,7 +12,8 @@ import pytest
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.statistics import statistics
 from anim.model import Clip, Interpolation
 from anim.optimization.optimize import Optimized, optimize

@@ -13,7 +13,8 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.maths import matrix, quaternion
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.model import AccessorFormat, Clip, Interpolation, Track
 from anim.sampling import sample_pose
 from anim.sampling.players import PLAYERS, sampler_for

@@ -9,7 +9,8 @@ import pytest
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.metric import NOISE, ErrorMetric, dense_times
+from anim.measure.error.metric import NOISE, ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, TimeAxis
 
 SHIFT, FACTOR = np.array([3.0, -2.0, 1.0]), 7.0  # of the quantized mesh space: q = 7 p + shift

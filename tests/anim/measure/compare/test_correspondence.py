@@ -9,7 +9,8 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Scene
 from tests.anim.measure.compare.altered import (
     FACTOR,

@@ -10,7 +10,8 @@ import pytest
 from anim.arrays import Floats
 from anim.measure.compare import diff as compare
 from anim.measure.compare.diff import diff
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Scene
 from anim.operations.resample import resample
 from tests.clips import about, clip, skeleton, track

@@ -8,7 +8,8 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.prover import Proof, Prover
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, Interpolation, Scene, Track
 from anim.sampling import world_matrices

@@ -9,7 +9,7 @@ from anim.arrays import Floats
 from anim.measure.continuous_bound.intervals import merge_intervals
 from anim.measure.continuous_bound.prover import PLAYER_ORDER
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
-from anim.measure.error.metric import dense_times
+from anim.measure.error.sample_times import dense_times
 from anim.model import Interpolation, Track
 from anim.sampling.batch import batches
 from anim.sampling.players import PLAYERS, sampler_for

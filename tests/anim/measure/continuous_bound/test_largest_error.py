@@ -12,7 +12,8 @@ from anim.curves.tangents.table import TANGENTS
 from anim.gltf.reading import reader
 from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
-from anim.measure.error.metric import ErrorMetric, cut_times, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import cut_times, dense_times
 from anim.model import Clip, Scene
 from anim.operations.resample import resample
 from anim.operations.spline import spline

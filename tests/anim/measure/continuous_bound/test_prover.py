@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from anim.gltf.reading import reader
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Prover
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.model import Scene, Track
 from tests.anim.measure.continuous_bound.making import ALL, apart, between, pair, proven
 from tests.anim.skinning.scenes import mesh, scene

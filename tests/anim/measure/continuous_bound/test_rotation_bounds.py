@@ -11,7 +11,7 @@ from anim.arrays import Floats
 from anim.measure.continuous_bound.intervals import Intervals, merge_intervals
 from anim.measure.continuous_bound.node_bounds import local_bounds, world_bounds
 from anim.measure.continuous_bound.track_partition import partition_tracks
-from anim.measure.error.metric import dense_times
+from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Scene
 from anim.sampling import world_matrices
 from anim.sampling.players import PLAYERS, sampler_for

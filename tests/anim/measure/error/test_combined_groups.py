@@ -9,8 +9,9 @@ import pytest
 
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import MaxDisplacement
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.shell_points import ShellPoints
 from anim.measure.error.surface import surfaces
 from anim.model import Clip, Scene

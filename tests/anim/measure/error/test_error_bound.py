@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.measure.error.metric import NOISE, SLACK, ErrorMetric, dense_times
+from anim.measure.error.metric import NOISE, SLACK, ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene, TimeAxis, Track
 from anim.operations.resample import resample

@@ -9,7 +9,8 @@ import pytest
 
 from anim.arrays import Floats
 from anim.gltf.reading import reader
-from anim.measure.error.metric import ErrorMetric, MotionError, key_and_mid_times
+from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.sample_times import key_and_mid_times
 from anim.model import Scene
 from tests.anim.measure.error.brute_force import clip_of, points_on_a_node, with_track
 from tests.clips import STEP, about, clip, skeleton, track

@@ -10,7 +10,8 @@ import pytest
 from anim.maths import quaternion
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error import reduced_skeleton
-from anim.measure.error.metric import ErrorMetric, dense_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times
 from anim.measure.error.statistics import statistics
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Skin
 from anim.sampling.players import PLAYERS

@@ -14,7 +14,8 @@ from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.measure.error import metric
 from anim.measure.error.displacement import MorphedDisplacement
-from anim.measure.error.metric import ErrorMetric, dense_times, key_and_mid_times
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.sample_times import dense_times, key_and_mid_times
 from anim.measure.error.statistics import FRAMES, SLACK, Peak, speed_error, statistics
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, TimeAxis, Track
 from anim.operations.resample import resample
