@@ -89,7 +89,7 @@ PUBLIC = {
     "measure.compare": "diff name_matching vertex_distance",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "largest_error prover",
-    "measure.error": "error_curve metric point_matrix shell_points statistics surface",
+    "measure.error": "error_curve metric point_matrix sample_times shell_points statistics surface",
     "measure.inspect": ("contents frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"),
     "measure.loops": "end_frames loop_analysis recommendations skin_motion",
     "optimization.search": "plan",
