@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
+from pathlib import PurePath
 
 from anim.check.finding import Finding, Occurrence, Severity
 from anim.gltf.document import Document
@@ -14,6 +16,8 @@ from cli.reports.inspect_report import MIN_ROOT_DISTANCE_M, PATHS, Inspected, fr
 from cli.reports.optimize_report import OptimizeReport, cost
 from cli.text import format_bytes, format_change, format_length, format_speed
 
+NEW_SUFFIX = "-new"  # of the file that advised commands write
+_IN_OUT = re.compile(r"(gltf-anim \S+) IN OUT\b")
 _CLIP = re.compile(r"/animations/(\d+)")
 _NODE = re.compile(r"/nodes/(\d+)")
 _SKIN = re.compile(r"/skins/(\d+)")
@@ -26,7 +30,7 @@ def report_panels(inspected: Inspected, document: Document) -> list[PagePanel]:
     groups = sorted(
         zip(inspected.findings, inspected.occurrences, strict=True), key=lambda each: order.index(each[0].severity)
     )
-    rows = tuple(_finding_row(*each, document) for each in groups) or (HEALTHY,)
+    rows = tuple(_finding_row(*each, document, inspected.name) for each in groups) or (HEALTHY,)
     facts = inspected.facts
     skins = tuple(map(_skin_row, facts.skins))
     return [
@@ -97,12 +101,23 @@ def size_panels(about: OptimizeReport) -> list[PagePanel]:
     return [PagePanel("Size", rows)]
 
 
-def _finding_row(finding: Finding, found: Sequence[Occurrence], document: Document) -> PageRow:
+def _finding_row(finding: Finding, found: Sequence[Occurrence], document: Document, name: str) -> PageRow:
     words = f"{finding.where}: {finding.problem}" if finding.where else finding.problem
     cells = (finding.name, finding.code)
     links = [(each.label, _link(each, document)) for each in found]
     parts = tuple((label, link) for label, link in links if link is not None) if len(found) > 1 else ()
-    return PageRow(cells, _link(finding, document), finding.severity.value, words, finding.advice, parts)
+    advice = advice_for(name, finding.advice)
+    return PageRow(cells, _link(finding, document), finding.severity.value, words, advice, parts)
+
+
+def advice_for(file: str, advice: str) -> str:
+    """Return advice with the names of a file and of a new one beside it instead of IN and OUT.
+
+    advice_for("walk.glb", "gltf-anim trim IN OUT --rebase") → "gltf-anim trim walk.glb walk-new.glb --rebase"
+    """
+    name = PurePath(PurePath(file).name)
+    names = shlex.join([str(name), f"{name.stem}{NEW_SUFFIX}{name.suffix}"])
+    return _IN_OUT.sub(lambda found: f"{found[1]} {names}", advice, count=1)
 
 
 def _link(found: Finding | Occurrence, document: Document) -> PageLink | None:

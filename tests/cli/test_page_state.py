@@ -49,6 +49,31 @@ def test_a_clip_whose_name_another_has(call: Call, tmp_path: Path) -> None:
     assert evaluate(page, [(address, ["player.state.clip"])]) == [[1]]
 
 
+def test_the_wheel_zooms_to_the_cursor_in_either_view(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(built("biped"))
+    page = tmp_path / "ab.html"
+    call("view", tmp_path / "a.glb", tmp_path / "a.glb", "-o", page).product()
+    point = "player.stage.camera.position.clone().set(0.1, 0.2, -1).unproject(player.stage.camera)"
+    canvas = "document.querySelector('#view canvas')"
+    codes = []
+    for side in (0, 1):
+        x, y = f"(0.55 + {side}) * {canvas}.clientWidth / 2", f"0.4 * {canvas}.clientHeight"
+        wheel = f"new WheelEvent('wheel', {{ deltaY: -300, clientX: left + {x}, clientY: top + {y}, cancelable: true }})"
+        codes.append(f"""(() => {{
+            const {{ stage }} = player, {{ left, top }} = {canvas}.getBoundingClientRect();
+            const ahead = stage.controls.target.clone().sub(stage.camera.position);
+            const ray = {point}.sub(stage.camera.position);
+            const below = ray.multiplyScalar(ahead.lengthSq() / ray.dot(ahead)).add(stage.camera.position);
+            {canvas}.dispatchEvent({wheel});
+            stage.camera.updateMatrixWorld();
+            const distance = stage.controls.target.distanceTo(stage.camera.position) / ahead.length();
+            const {{ x, y }} = below.project(stage.camera);
+            return [distance, x, y].map((each) => Math.round(each * 1e4) / 1e4);
+        }})()""")
+    for found in evaluate(page, [("#t=0", codes)])[0]:
+        assert found == [pytest.approx(1.0005**-300, abs=2e-4), pytest.approx(0.1, abs=4e-3), pytest.approx(0.2, abs=4e-3)]
+
+
 def test_arrows_leave_out_folded_rows_and_show_those_below_the_filter(
     fixture: Fixture, call: Call, tmp_path: Path
 ) -> None:

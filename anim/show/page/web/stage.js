@@ -4,6 +4,7 @@ import { Box3, Mesh, PerspectiveCamera, PlaneGeometry, ShaderMaterial, Vector3, 
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { formatLength, roundDown } from "./format.js";
 import { state } from "./state.js";
+import { listenToWheel, zoomTo } from "./zoom.js";
 
 const FIT_TIMES = 5; // of the clip
 const MAX_FIT_VERTICES = 400; // per mesh and time
@@ -12,6 +13,7 @@ const MIN_FRAME_PER_RADIUS = 0.15; // radius around a framed node, in radii of t
 const MAX_PIXEL_RATIO = 2;
 const CAMERA_DIGITS = 3; // of the camera in the address, below the radius of the model
 const MAX_DECIMALS = 12;
+const MAX_ZOOM = 50; // of the wheel, from the camera that frames everything
 const FLOOR_RADII = 6; // radius of the floor, in radii of the model
 const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from the front, a little from the left and above
 
@@ -22,6 +24,7 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setScissorTest(true);
     this.camera = new PerspectiveCamera(32);
+    listenToWheel(canvas, (scale, x, y) => this.#zoom(scale, x, y));
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.controls.dampingFactor = 0.12;
@@ -52,6 +55,7 @@ export class Stage {
     this.camera.far = distance * 50;
     this.camera.position.copy(DIRECTION).setLength(distance).add(center);
     this.controls.target.copy(center);
+    this.controls.minDistance = distance / MAX_ZOOM;
     this.controls.maxDistance = distance * 10;
     this.controls.update();
     this.framed = `${this.#camera} ${this.#subject}`;
@@ -102,6 +106,13 @@ export class Stage {
     this.camera.position.copy(position);
     this.controls.target.copy(target);
     this.controls.update();
+  }
+
+  /** Zoom to a point of the canvas in CSS pixels: to that of its view. */
+  #zoom(scale, x, y) {
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentNode;
+    const part = width / this.shown.length;
+    zoomTo(this, scale, (2 * (x % part)) / part - 1, 1 - (2 * y) / height);
   }
 
   /** Positions of some vertices of all files, at some times; of nodes where there is no mesh. */

@@ -1,0 +1,33 @@
+// Zoom to the cursor: what is below it stays there. OrbitControls takes the whole canvas for one view; here are up to two.
+
+import { Vector3 } from "three";
+
+const SCALE_PER_PX = 1.0005; // of the camera's distance; up is nearer
+const MODE_PX = [1, 16, 100]; // of wheel events in pixels, lines and pages
+const PINCH = 10; // pinches of a trackpad come as wheel events with Ctrl and small steps
+
+/** Zoom by the wheel in place of OrbitControls; it must be called before they listen. Fingers are left to them. */
+export function listenToWheel(canvas, zoom) {
+  const onWheel = (event) => {
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    const pixels = event.deltaY * MODE_PX[event.deltaMode] * (event.ctrlKey ? PINCH : 1);
+    zoom(SCALE_PER_PX ** pixels, event.offsetX, event.offsetY);
+  };
+  canvas.addEventListener("wheel", onWheel, { passive: false });
+}
+
+/**
+ * Scale the distances of camera and target from the point of the target's plane at (x, y), each from -1 to 1 in a view.
+ * The direction of the view stays. minDistance, maxDistance: of the camera from its target.
+ */
+export function zoomTo({ camera, controls }, scale, x, y) {
+  const { target, minDistance, maxDistance } = controls;
+  const distance = camera.position.distanceTo(target);
+  const allowed = Math.max(minDistance, Math.min(distance * scale, maxDistance)) / distance;
+  const ray = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position);
+  const ahead = target.clone().sub(camera.position);
+  const point = ray.multiplyScalar(ahead.lengthSq() / ray.dot(ahead)).add(camera.position);
+  for (const each of [camera.position, target]) each.sub(point).multiplyScalar(allowed).add(point);
+  controls.update();
+}
