@@ -195,7 +195,7 @@ async function tryDesktop(file, faults) {
   if (await get("player.sides.length > 1")) {
     await press("h");
     expect(await get(`player.state.show.has("heat")`), "heat");
-    for (const side of ["a", "b", "both"]) {
+    for (const side of ["a", "b", "over", "both"]) {
       await press("b");
       expect((await get("player.state.side")) === side, `side ${side}`);
     }

@@ -10,7 +10,7 @@ import pytest
 
 from anim.gltf.io import container
 from tests.browser import evaluate, needs_browser
-from tests.cli.conftest import Call, Fixture
+from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import built
 from tests.cli.test_table import renamed
 
@@ -58,7 +58,9 @@ def test_the_wheel_zooms_to_the_cursor_in_either_view(call: Call, tmp_path: Path
     codes = []
     for side in (0, 1):
         x, y = f"(0.55 + {side}) * {canvas}.clientWidth / 2", f"0.4 * {canvas}.clientHeight"
-        wheel = f"new WheelEvent('wheel', {{ deltaY: -300, clientX: left + {x}, clientY: top + {y}, cancelable: true }})"
+        wheel = (
+            f"new WheelEvent('wheel', {{ deltaY: -300, clientX: left + {x}, clientY: top + {y}, cancelable: true }})"
+        )
         codes.append(f"""(() => {{
             const {{ stage }} = player, {{ left, top }} = {canvas}.getBoundingClientRect();
             const ahead = stage.controls.target.clone().sub(stage.camera.position);
@@ -71,7 +73,45 @@ def test_the_wheel_zooms_to_the_cursor_in_either_view(call: Call, tmp_path: Path
             return [distance, x, y].map((each) => Math.round(each * 1e4) / 1e4);
         }})()""")
     for found in evaluate(page, [("#t=0", codes)])[0]:
-        assert found == [pytest.approx(1.0005**-300, abs=2e-4), pytest.approx(0.1, abs=4e-3), pytest.approx(0.2, abs=4e-3)]
+        assert found == [
+            pytest.approx(1.0005**-300, abs=2e-4),
+            pytest.approx(0.1, abs=4e-3),
+            pytest.approx(0.2, abs=4e-3),
+        ]
+
+
+def test_the_ghost_of_a_covers_b_only_where_both_differ(call: Call, tmp_path: Path) -> None:
+    """Equal files make the picture of B alone; there is more blue where A is elsewhere."""
+    (tmp_path / "a.glb").write_bytes(built("biped"))
+    call("optimize", tmp_path / "a.glb", tmp_path / "b.glb", "--max-error", "5%", "--effort", "fast")
+    blue = """(() => {
+        player.draw();
+        const { domElement: { width, height } } = player.stage.renderer;
+        const gl = player.stage.renderer.getContext(), pixels = new Uint8Array(4 * width * height);
+        gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+        let count = 0;
+        for (let i = 0; i < pixels.length; i += 4) count += pixels[i + 2] > pixels[i] + 60;
+        return count;
+    })()"""
+    sides = [f"(player.update({{ side: '{side}' }}), {blue})" for side in ("b", "over")]
+    found = []
+    for name in ("a.glb", "b.glb"):
+        call("view", tmp_path / "a.glb", tmp_path / name, "-o", tmp_path / "ab.html").product()
+        found += evaluate(tmp_path / "ab.html", [("#clip=jump&t=0.438&show=clay", sides)])
+    (alone, equal), (_, different) = found
+    assert equal == alone
+    assert different > alone + 500
+
+
+def test_bones_begin_at_joints_with_vertices(asset: Find, call: Call, tmp_path: Path) -> None:
+    """Dashes lead to the controls of IK and from the root; ends of chains such as slots of hands are bones."""
+    page = tmp_path / "a.html"
+    call("view", asset("Knight.glb"), "-o", page).product()
+    names = "player.extras[0].bones.{}.map(([parent, child]) => `${{parent.name}} ${{child.name}}`)"
+    ((bones, guides),) = evaluate(page, [("#t=0", [names.format("links"), names.format("guides")])])
+    assert {"upperleg.l lowerleg.l", "chest head", "hand.l handslot.l"} <= set(bones)
+    assert {"root kneeIK.l", "root handIK.r", "root hips", "control-heel-roll.l IK-toe.l"} <= set(guides)
+    assert not [link for link in bones if "IK" in link or "control" in link or link.startswith("root ")]
 
 
 def test_arrows_leave_out_folded_rows_and_show_those_below_the_filter(

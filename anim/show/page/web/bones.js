@@ -1,39 +1,42 @@
-// The skeleton: an octahedron from each joint to its child, seen through the skin.
+// The skeleton: an octahedron from each joint to its child, seen through the skin; dashes from roots and to controls.
 
 import {
+  BufferAttribute,
+  BufferGeometry,
   Color,
   InstancedMesh,
+  LineDashedMaterial,
+  LineSegments,
   Matrix4,
   MeshLambertMaterial,
   OctahedronGeometry,
   Quaternion,
   Vector3,
 } from "three";
+import { nodeLinks } from "./links.js";
 
 const BONE_COLOR = 0x8fa8d8;
 const CHOSEN_COLOR = 0xff9d2e;
 const WIDTH_PER_LENGTH = 0.13;
 const JOINT_PER_RADIUS = 0.011;
+const DASH_PER_RADIUS = 0.02;
 const UP = new Vector3(0, 1, 0);
 
 export class Bones {
   constructor(side) {
     this.side = side;
     this.nodes = shownNodes(side);
-    const indices = new Set(this.nodes.map((node) => node.index));
-    this.links = this.nodes.flatMap((node) => {
-      let parent = node.parent;
-      while (parent !== null && !indices.has(parent)) parent = side.nodes.get(parent)?.parent ?? null;
-      return parent === null ? [] : [[side.nodes.get(parent), node]];
-    });
+    const { bones, guides } = nodeLinks(side, this.nodes);
+    [this.links, this.guides] = [bones, guides];
+    this.lines = dashes(guides.length);
     this.bones = instances(boneShape(), this.links.length);
     this.joints = instances(new OctahedronGeometry(1, 1), this.nodes.length);
-    side.overlay.add(this.bones, this.joints);
+    side.overlay.add(this.lines, this.bones, this.joints);
   }
 
   /** Follow the pose. chosen: index of the highlighted node. colors: of nodes by index, instead of their own. */
   update(isShown, radius, chosen, colors) {
-    this.bones.visible = isShown;
+    this.bones.visible = this.lines.visible = isShown;
     this.joints.visible = isShown || Boolean(colors);
     if (!this.joints.visible) {
       if (chosen !== null && this.side.nodes.has(chosen)) this.#mark(radius, chosen);
@@ -58,6 +61,18 @@ export class Bones {
       this.joints.setColorAt(i, color.set(isChosen ? CHOSEN_COLOR : colors?.get(node.index) ?? 0xffffff));
     }
     this.#show(this.links.length, this.nodes.length);
+    this.#moveLines(radius);
+  }
+
+  #moveLines(radius) {
+    const place = new Vector3();
+    const ends = this.lines.geometry.attributes.position;
+    for (const [i, node] of this.guides.flat().entries()) {
+      place.setFromMatrixPosition(node.object.matrixWorld).toArray(ends.array, 3 * i);
+    }
+    ends.needsUpdate = true;
+    this.lines.computeLineDistances();
+    this.lines.material.dashSize = this.lines.material.gapSize = radius * DASH_PER_RADIUS;
   }
 
   /** Only the chosen node, while the skeleton is not shown. */
@@ -100,6 +115,15 @@ function boneShape() {
   }
   shape.computeVertexNormals();
   return shape;
+}
+
+function dashes(count) {
+  const shape = new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6 * count), 3));
+  const lines = new LineSegments(shape, new LineDashedMaterial({ color: BONE_COLOR, depthTest: false, transparent: true }));
+  lines.frustumCulled = false;
+  lines.renderOrder = 10;
+  lines.visible = false;
+  return lines;
 }
 
 function instances(shape, count) {

@@ -24,8 +24,8 @@ export class Player {
   constructor(sides) {
     this.sides = sides;
     this.stage = new Stage($("#view canvas"), sides);
-    this.extras = sides.map((side) => ({ bones: new Bones(side), onion: new Onion(side) }));
     for (const side of sides) side.pose(0);
+    this.extras = sides.map((side) => ({ bones: new Bones(side), onion: new Onion(side) }));
     this.pairs = new MeshPairs(sides, facts.meshes);
     this.isLive = this.pairs.vertexCount <= MAX_LIVE_VERTICES;
     this.timeline = new Timeline($("#scrub"), (time) => this.seek(time, { pause: true }));

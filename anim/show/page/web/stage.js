@@ -3,6 +3,7 @@
 import { Box3, Mesh, PerspectiveCamera, PlaneGeometry, ShaderMaterial, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { formatLength, roundDown } from "./format.js";
+import { Ghost } from "./ghost.js";
 import { state } from "./state.js";
 import { listenToWheel, zoomTo } from "./zoom.js";
 
@@ -20,7 +21,7 @@ const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from the fron
 export class Stage {
   constructor(canvas, sides) {
     this.sides = sides;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, stencil: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setScissorTest(true);
     this.camera = new PerspectiveCamera(32);
@@ -33,6 +34,7 @@ export class Stage {
       side.scene.add(mesh);
       return mesh;
     });
+    this.ghost = new Ghost();
     this.radius = 1;
     this.cell = 1;
     this.framed = ""; // camera that frames everything, as text, and what it frames
@@ -171,6 +173,15 @@ export class Stage {
       renderer.setScissor(i * part, 0, part, height);
       renderer.render(side.scene, camera);
     }
+    if (state.side === "over" && this.sides.length > 1) this.#drawGhost();
+  }
+
+  #drawGhost() {
+    const [side] = this.sides;
+    const hidden = [this.floors[0], side.overlay];
+    const isHeat = state.show.has("heat");
+    const { target } = this.controls;
+    this.ghost.draw(this.renderer, side, this.camera, { target, radius: this.radius, hidden, isHeat });
   }
 
   /** Position of a point of the scene on the screen: CSS pixels in the view that shows `side`; null if behind. */

@@ -2,7 +2,7 @@
 
 export const SHOWS = ["bones", "wire", "onion", "clay", "curves", "heat"];
 export const OF_NODES = ["bones", "curves"]; // which a vertex cache has none of
-export const SIDES = ["both", "a", "b"];
+export const SIDES = ["both", "a", "b", "over"]; // over: A as a ghost over B
 export const LOOPS = ["loop", "once", "ping-pong"];
 export const UNITS = ["degrees", "values"];
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
