@@ -1,0 +1,112 @@
+"""Outputs of `optimize` beside the model: report, page of both versions, and the result on the terminal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
+
+from anim.gltf.io import container
+from anim.measure.error.surface import is_measured_at
+from anim.optimization.optimize import Optimized
+from anim.optimization.options import Request
+from cli.errors import UsageError
+from cli.io import documents
+from cli.reports import optimize_json, optimize_report
+from cli.text import Reporter
+from cli.workflows.optimize_job import OptimizeJob
+from cli.workflows.rate_curve import check_curve_file
+
+
+@dataclass(frozen=True, slots=True)
+class OptimizeOutputs:
+    """Files beside the model, None for those not asked for."""
+
+    report: str | None
+    html: str | None
+    curve: str | None
+    dry_run: bool
+
+    def check_options(self, *, out: str | None, max_bytes: str | None) -> None:
+        """Raise UsageError for options that exclude each other."""
+        if self.curve is not None and (max_bytes is not None or self.report is not None):
+            raise UsageError("--curve goes with neither --max-bytes nor --report")
+        if out is not None and (self.report is not None or self.curve is not None):
+            raise UsageError(f"--{'curve' if self.report is None else 'report'} is about one file: leave out --out")
+        if self.html is not None:
+            from cli.io.page_output import check_page  # imports readers of all formats, as in the function below
+
+            check_page(self.html, "--html")
+            if out is not None or self.curve is not None:
+                raise UsageError(f"--html goes with neither --{'out' if self.curve is None else 'curve'}")
+
+    def check_paths(self, input: str, output: str) -> None:
+        """Raise before any work for outputs that can't be written or are another file of the command."""
+        if self.curve is not None:
+            check_curve_file(self.curve)
+        elif not self.dry_run:
+            documents.check_output(output)
+        if self.report is not None and self.report != documents.PIPE:
+            _check_report(self.report, input, output)
+        if self.report == output == documents.PIPE and self.curve is None and not self.dry_run:
+            raise UsageError("--report and OUT can't both be stdout")
+
+
+def describe(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:
+    """Return the report on an optimization."""
+    source, result = work.source, work.smaller(found)
+    name = source.name if work.output == documents.PIPE else work.output
+    size, measured_at = work.size(result), is_measured_at(work.scene)
+    seconds = time.perf_counter() - began
+    return optimize_report.OptimizeReport(
+        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, measured_at
+    )
+
+
+@contextmanager
+def write_report(
+    about: optimize_report.OptimizeReport, reporter: Reporter, path: str | None, *, dry_run: bool
+) -> Iterator[None]:
+    """Write the report around the block that writes the model: if one of them fails, neither file changes.
+
+    On stdout the report is written first, so that the model stays unchanged if the report can't be written.
+    """
+    if path is None or (dry_run and path != documents.PIPE):
+        yield
+        return
+    warnings = [*reporter.warnings, *optimize_report.warnings(about)]
+    with documents.commit_text_after(optimize_json.as_json(about, warnings=warnings), path):
+        yield
+
+
+def report_result(about: optimize_report.OptimizeReport, reporter: Reporter, *, dry_run: bool) -> None:
+    for line in optimize_report.lines(about, dry_run=dry_run):
+        reporter.info(line)
+    for words in optimize_report.warnings(about):
+        reporter.warn(words)
+    for line in optimize_report.details(about) if reporter.verbose else ():
+        reporter.verbose_info(line)
+
+
+def _check_report(report: str, input: str, output: str) -> None:
+    """Raise UsageError for a report path that is a model's."""
+    documents.check_file(report)
+    if PurePath(report).suffix.lower() in (*container.SUFFIXES, ".bin") or Path(report).resolve() in {
+        Path(other).resolve() for other in (input, output) if other != documents.PIPE
+    }:
+        raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
+
+
+def write_comparison(html: str, input: str, about: optimize_report.OptimizeReport, reporter: Reporter) -> None:
+    """Write the page that compares the model before and after."""
+    from cli.io.page_output import page_file, write_page
+    from cli.reports.page_panels import size_panels
+    from cli.workflows.page_comparison import compare_files, worst_view
+
+    before = page_file(input, about.before, about.size_before)
+    after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
+    content = compare_files(before, after, reporter)
+    view = worst_view(before, content)
+    write_page(html, before, after, reporter, content=content, panels=size_panels(about), view=view)
