@@ -59,9 +59,12 @@ def _table(path: Path) -> dict[str, Any] | None:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
+    except RecursionError:
+        raise UsageError(f"{path}: is nested too deep") from None
     except (OSError, ValueError) as error:  # of TOML, or of UTF-8
         raise UsageError(f"{path}: {error}") from None
     if path.name != PROJECT:
         return content
-    table = content.get("tool", {}).get("gltf-anim")
+    tools = content.get("tool")
+    table = tools.get("gltf-anim") if isinstance(tools, dict) else None
     return table if isinstance(table, dict) else None

@@ -92,6 +92,7 @@ def _work(jobs: Sequence[Job], writing: int, look: Look) -> None:
 
 def _one(job: Job, folder: Path, look: Look) -> Outcome:
     for name, data in job.files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
     os.chdir(folder)
     sys.stdin = io.TextIOWrapper(io.BytesIO())

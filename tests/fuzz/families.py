@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -23,10 +22,14 @@ from cli import main
 from cli.io.cache_folders import CacheFolder
 from tests.fuzz.execution import CPU_LIMIT_S, Job, Outcome
 from tests.fuzz.mutations import mutate
+from tests.fuzz.seed import Seed
+from tests.fuzz.settings_seeds import settings_seeds
+from tests.fuzz.simulation_seeds import body_seeds, spring_seeds
 
 MAX_LINE_LENGTH = 1100  # characters of stderr
 MAX_PEAK_BYTES = 1_000_000_000
 QUESTIONS = ("--", "the clip's end")  # an option has to say what the file leaves open, or does not suit it
+SETTINGS = {"gltf-anim.toml", "pyproject.toml"}
 CODES = (0, 3, 4, 5, 6)  # 2 is for command lines, and those here are sound
 
 GLTF_FIXTURES = ("arm", "morph_cube", "interpolations", "pointer", "gltf_embedded")
@@ -64,20 +67,10 @@ CACHE_LINES = ("convert-cache IN out.npz", "convert-cache IN out.glb", "convert-
 CACHE_ENDINGS = (".npz", ".pc2", ".mdd", ".png", ".exr", ".usda", ".usdc", ".ply", ".obj", ".stl", ".glb")
 
 
-@dataclass(frozen=True, slots=True)
-class Seed:
-    """A sound input: its main file, all files, those that are mutated, and its command lines."""
-
-    main: str
-    files: Mapping[str, bytes]
-    mutated: Sequence[str]
-    lines: Sequence[str]
-
-
 @cache
 def seeds(family: str) -> tuple[Seed, ...]:
     """Return the sound inputs of a family."""
-    return tuple({"gltf": _gltf, "euler": _euler, "cache": _caches}[family]())
+    return tuple(SEEDS[family]())
 
 
 def jobs(family: str, seed: int, numbers: range) -> list[Job]:
@@ -132,10 +125,21 @@ def _made(line: str) -> dict[str, bytes]:
         return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir()) if path.name != "arm.glb"}
 
 
-def problems(outcome: Outcome) -> list[str]:
-    """Return the faults of an outcome: what no input may cause."""
+SEEDS: dict[str, Callable[[], Iterator[Seed]]] = {
+    "gltf": _gltf,
+    "euler": _euler,
+    "cache": _caches,
+    "springs": spring_seeds,
+    "bodies": body_seeds,
+    "settings": settings_seeds,
+}
+
+
+def problems(job: Job, outcome: Outcome) -> list[str]:
+    """Return the faults of an outcome: what no input may cause. Wrong settings are wrong usage."""
     found = list(outcome.problems)
-    is_question = outcome.code == 2 and any(words in outcome.err for words in QUESTIONS)
+    words_of_questions = QUESTIONS if not SETTINGS & set(job.files) else ("",)
+    is_question = outcome.code == 2 and any(words in outcome.err for words in words_of_questions)
     if outcome.code not in CODES and not is_question:
         found.append(f"exit code {outcome.code}")
     if outcome.cpu_s > CPU_LIMIT_S or outcome.code == -24:
@@ -152,7 +156,7 @@ def look(line: Sequence[str], code: int, names: Sequence[str], out: bytes) -> li
     """Return the faults of the outputs in the current folder: a file of a failed run, or one that can't be read."""
     written = [name for name in names if not name.startswith("{")]
     if code not in (0, 6):
-        several = any("{clip}" in word for word in line)  # those of clips before stay, and a note tells so
+        several = line[0] == "run" or any("{clip}" in word for word in line)  # those before stay, and a note tells so
         return [f"{name} is left" for name in written if not several]
     found = []
     for name in written:

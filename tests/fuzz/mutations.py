@@ -6,6 +6,7 @@ import io
 import json
 import re
 import struct
+import tomllib
 import zipfile
 from collections.abc import Callable
 from random import Random
@@ -116,6 +117,35 @@ def mutate_json_file(data: bytes, chosen: Random) -> bytes:
     return json.dumps(document).encode()
 
 
+def mutate_lines(data: bytes, chosen: Random) -> bytes:
+    """Return lines of JSON with one of them changed."""
+    if chosen.random() < 0.3:
+        return mutate_text(data, chosen)
+    lines = data.splitlines()
+    at = chosen.randrange(len(lines))
+    lines[at] = mutate_json_file(lines[at], chosen)
+    return b"\n".join(lines) + b"\n"
+
+
+def mutate_toml(data: bytes, chosen: Random) -> bytes:
+    """Return settings with values, words or bytes changed."""
+    if chosen.random() < 0.5:
+        return mutate_text(data, chosen)
+    document = tomllib.loads(data.decode())
+    mutate_json(document, chosen)
+    rows = [f"{json.dumps(key)} = {_toml(value)}\n" for key, value in document.items()]
+    return "".join(rows).encode("utf-8", "surrogatepass")
+
+
+def _toml(value: Any) -> str:
+    """A value of JSON as one of TOML, which has no null."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return "nan" if value is None else json.dumps(value)
+
+
 def mutate_text(data: bytes, chosen: Random) -> bytes:
     """Return a text with words or lines changed."""
     if chosen.random() < 0.2:
@@ -164,6 +194,8 @@ MUTATIONS: dict[str, Mutate] = {
     ".glb": mutate_glb,
     ".gltf": mutate_json_file,
     ".json": mutate_json_file,
+    ".jsonl": mutate_lines,
+    ".toml": mutate_toml,
     ".npz": mutate_npz,
     ".bvh": mutate_text,
     ".csv": mutate_text,

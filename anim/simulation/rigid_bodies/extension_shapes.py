@@ -59,28 +59,33 @@ class ShapeReader:
     def mesh(self, index: Any, kind: str, weights: Any = None) -> Shape:
         """Return the "mesh" or "hull" of a mesh by index. weights: of its morph targets."""
         read_item(json_array(self._document.json, "meshes"), index, "mesh")
-        chosen = None if weights is None else np.asarray(weights, np.float64)
-        return mesh_shape(self._meshes.mesh(index, joint_count=0), kind, chosen)
+        mesh = self._meshes.mesh(index, joint_count=0)
+        own = read_numbers({"weights": weights}, "weights", len(mesh.rest_weights))
+        return mesh_shape(mesh, kind, None if own is None else np.array(own))
 
     def node_meshes(self, node: Any, kind: str) -> Shape:
         """Return the "mesh" or "hull" of the meshes of a node and its descendants, in the node's space."""
         read_item(json_array(self._document.json, "nodes"), node, "node")
-        found = self._collect(int(node), np.eye(4)[:3])
+        found = self._collect(int(node))
         if not found:
             raise FormatError(f"node {node} has no mesh to collide with")
         joined = join_meshes(found)
         return joined if kind == "mesh" else Shape("hull", points=joined.points[np.unique(joined.faces)])
 
-    def _collect(self, node: int, to_root: Any) -> list[Shape]:
-        json = json_array(self._document.json, "nodes")[node]
-        found = []
-        if "mesh" in json:
-            if "skin" in json:
-                raise UnsupportedError(f"{self._skeleton.label(node)} is skinned: a collider's mesh must be rigid")
-            shape = self.mesh(json["mesh"], "mesh", json.get("weights"))
-            found.append(Shape("mesh", points=matrix.apply(to_root, shape.points), faces=shape.faces))
-        for child in json.get("children", ()):
-            found += self._collect(child, matrix.multiply(to_root, self._local[child]))
+    def _collect(self, root: int) -> list[Shape]:
+        """Shapes of the meshes on a node and below, depth first, in the node's space."""
+        nodes, found = json_array(self._document.json, "nodes"), []
+        waiting = [(root, np.eye(4)[:3])]
+        while waiting:
+            node, to_root = waiting.pop()
+            json = nodes[node]
+            if "mesh" in json:
+                if "skin" in json:
+                    raise UnsupportedError(f"{self._skeleton.label(node)} is skinned: a collider's mesh must be rigid")
+                shape = self.mesh(json["mesh"], "mesh", json.get("weights"))
+                found.append(Shape("mesh", points=matrix.apply(to_root, shape.points), faces=shape.faces))
+            children = reversed(json.get("children", ()))
+            waiting += [(child, matrix.multiply(to_root, self._local[child])) for child in children]
         return found
 
     def _round_shape(self, kind: str, values: dict[str, Any]) -> Shape:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from anim.errors import AnimError, FormatError, RangeError
@@ -15,10 +16,9 @@ def as_fault(error: AnimError, where: str) -> AnimError:
 
 def read_number(json: dict[str, Any], key: str, default: float) -> float:
     """Return a finite number. Raises FormatError for anything else."""
-    value = json.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise FormatError(f"{key} is {value!r} (expected a number)")
-    return float(value)
+    if key not in json:
+        return default
+    return _number(json[key], key)
 
 
 def read_numbers(json: dict[str, Any], key: str, count: int) -> tuple[float, ...] | None:
@@ -26,16 +26,39 @@ def read_numbers(json: dict[str, Any], key: str, count: int) -> tuple[float, ...
     values = json.get(key)
     if values is None:
         return None
-    numbers = [value for value in values if isinstance(value, int | float)] if isinstance(values, list) else []
-    if len(numbers) != count or len(values) != count:
+    if not isinstance(values, list) or len(values) != count:
         raise FormatError(f"{key} is {values!r} (expected {count} numbers)")
-    return tuple(float(value) for value in numbers)
+    return tuple(_number(value, key) for value in values)
 
 
 def read_vector(json: dict[str, Any], key: str) -> Vector | None:
     """Return an array of three numbers, None without it."""
     found = read_numbers(json, key, 3)
     return None if found is None else (found[0], found[1], found[2])
+
+
+def read_texts(json: dict[str, Any], key: str) -> frozenset[str]:
+    """Return an array of strings, empty without it. Raises FormatError for anything else."""
+    values = json.get(key, [])
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise FormatError(f"{key} is {values!r} (expected strings)")
+    return frozenset(values)
+
+
+def read_axes(json: dict[str, Any], key: str) -> tuple[int, ...]:
+    """Return an array of integers. Raises FormatError for anything else."""
+    values = json.get(key)
+    if not isinstance(values, list) or not all(type(value) is int for value in values):
+        raise FormatError(f"{key} is {values!r} (expected some of 0, 1, 2)")
+    return tuple(values)
+
+
+def read_objects(json: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    """Return an array of objects, empty without it. Raises FormatError for anything else."""
+    values = json.get(key, [])
+    if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
+        raise FormatError(f"{key} is {values!r} (expected a list of objects)")
+    return values
 
 
 def read_item(items: list[Any], index: Any, what: str) -> Any:
@@ -51,3 +74,15 @@ def read_object(json: dict[str, Any], key: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise FormatError(f"{key} is {value!r} (expected an object)")
     return value
+
+
+def _number(value: Any, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FormatError(f"{key} is {value!r} (expected a number)")
+    try:
+        found = float(value)
+    except OverflowError:  # an integer beyond float64
+        found = math.inf
+    if not math.isfinite(found):
+        raise FormatError(f"{key} is beyond 1.8e308 (expected a finite number)")
+    return found

@@ -22,10 +22,13 @@ from anim.simulation.rigid_bodies.description import (
 from anim.simulation.rigid_bodies.extension_shapes import KHR_DEFAULTS, ShapeReader
 from anim.simulation.rigid_bodies.extension_values import (
     as_fault,
+    read_axes,
     read_item,
     read_number,
     read_numbers,
     read_object,
+    read_objects,
+    read_texts,
     read_vector,
 )
 
@@ -42,14 +45,12 @@ def read_khr(document: Document, skeleton: Skeleton) -> PhysicsDescription:
     root = read_object(document.json, "extensions")
     top = read_object(root, NAME)
     found = [read_object(root, name) for name in SHAPE_EXTENSIONS if name in root]
-    shapes = found[0].get("shapes", []) if found else []
+    shapes = read_objects(found[0], "shapes") if found else []
     reader = ShapeReader(document, skeleton, shapes, KHR_DEFAULTS)
     motions, colliders, joints = {}, {}, []
     for i, node in enumerate(json_array(document.json, "nodes")):
-        about = node.get("extensions", {}).get(NAME)
-        if not about:
-            continue
         try:
+            about = read_object(read_object(node, "extensions"), NAME)
             if "motion" in about:
                 motions[i] = read_motion(read_object(about, "motion"))
             if "collider" in about:
@@ -84,9 +85,11 @@ def read_motion(json: dict[str, Any]) -> Motion:
 def _collider(json: dict[str, Any], top: dict[str, Any], reader: ShapeReader) -> Collider:
     material, own = Material(), CollisionFilter()
     if "physicsMaterial" in json:
-        material = _material(read_item(top.get("physicsMaterials", []), json["physicsMaterial"], "physics material"))
+        material = _material(
+            read_item(read_objects(top, "physicsMaterials"), json["physicsMaterial"], "physics material")
+        )
     if "collisionFilter" in json:
-        own = _filter(read_item(top.get("collisionFilters", []), json["collisionFilter"], "collision filter"))
+        own = _filter(read_item(read_objects(top, "collisionFilters"), json["collisionFilter"], "collision filter"))
     return Collider(_geometry(read_object(json, "geometry") or json, reader), material, own)
 
 
@@ -115,21 +118,17 @@ def _material(json: dict[str, Any]) -> Material:
 
 
 def _filter(json: dict[str, Any]) -> CollisionFilter:
-    chosen = frozenset(map(str, json["collideWithSystems"])) if "collideWithSystems" in json else None
-    return CollisionFilter(
-        frozenset(map(str, json.get("collisionSystems", ()))),
-        chosen,
-        frozenset(map(str, json.get("notCollideWithSystems", ()))),
-    )
+    chosen = read_texts(json, "collideWithSystems") if "collideWithSystems" in json else None
+    return CollisionFilter(read_texts(json, "collisionSystems"), chosen, read_texts(json, "notCollideWithSystems"))
 
 
 def _joint(node: int, json: dict[str, Any], top: dict[str, Any], count: int) -> Joint:
     connected = json.get("connectedNode")
     read_item([None] * count, connected, "node")
     assert isinstance(connected, int)
-    about = read_item(top.get("physicsJoints", []), json.get("joint"), "physics joint")
-    limits = tuple(_limit(each) for each in about.get("limits", ()))
-    drives = tuple(_drive(each) for each in about.get("drives", ()))
+    about = read_item(read_objects(top, "physicsJoints"), json.get("joint"), "physics joint")
+    limits = tuple(_limit(each) for each in read_objects(about, "limits"))
+    drives = tuple(_drive(each) for each in read_objects(about, "drives"))
     return Joint(node, connected, limits, drives, bool(json.get("enableCollision", False)))
 
 
@@ -139,7 +138,7 @@ def _limit(json: dict[str, Any]) -> JointLimit:
         raise FormatError("a joint's limit has linearAxes and angularAxes, or neither (expected one)")
     return JointLimit(
         angular,
-        tuple(json["angularAxes" if angular else "linearAxes"]),
+        read_axes(json, "angularAxes" if angular else "linearAxes"),
         read_number(json, "min", -math.inf),
         read_number(json, "max", math.inf),
         read_number(json, "stiffness", 0.0) if "stiffness" in json else None,
@@ -151,9 +150,12 @@ def _drive(json: dict[str, Any]) -> JointDrive:
     kind, mode = json.get("type"), json.get("mode", "force")
     if kind not in DRIVE_TYPES or mode not in DRIVE_MODES:
         raise FormatError(f"a joint's drive is {kind!r}, {mode!r} (expected linear or angular, force or acceleration)")
+    axis = json.get("axis")
+    if type(axis) is not int:
+        raise FormatError(f"a joint's drive has axis {axis!r} (expected 0, 1 or 2)")
     return JointDrive(
         kind == "angular",
-        json.get("axis", -1),
+        axis,
         mode == "acceleration",
         read_number(json, "maxForce", math.inf),
         read_number(json, "positionTarget", 0.0),

@@ -10,7 +10,7 @@ from anim.gltf.document import Document, json_array
 from anim.model import Skeleton
 from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription
 from anim.simulation.rigid_bodies.extension_shapes import OMI_DEFAULTS, ShapeReader
-from anim.simulation.rigid_bodies.extension_values import as_fault, read_number, read_object
+from anim.simulation.rigid_bodies.extension_values import as_fault, read_number, read_object, read_objects, read_vector
 from anim.simulation.rigid_bodies.khr_reader import read_motion
 
 NAME, SHAPES = "OMI_physics_body", "OMI_physics_shape"
@@ -22,14 +22,12 @@ def read_omi(document: Document, skeleton: Skeleton) -> PhysicsDescription:
 
     A static motion is none. Raises FormatError, RangeError or UnsupportedError with the node.
     """
-    shapes = read_object(read_object(document.json, "extensions"), SHAPES).get("shapes", [])
+    shapes = read_objects(read_object(read_object(document.json, "extensions"), SHAPES), "shapes")
     reader = ShapeReader(document, skeleton, shapes, OMI_DEFAULTS)
     motions, colliders = {}, {}
     for i, node in enumerate(json_array(document.json, "nodes")):
-        about = node.get("extensions", {}).get(NAME)
-        if not about:
-            continue
         try:
+            about = read_object(read_object(node, "extensions"), NAME)
             if "motion" in about and (motion := _motion(read_object(about, "motion"))) is not None:
                 motions[i] = motion
             if "collider" in about:
@@ -45,7 +43,7 @@ def _motion(json: dict[str, Any]) -> Motion | None:
         raise FormatError(f"type is {kind!r} (expected static, kinematic or dynamic)")
     if kind == "static":
         return None
-    inertia = json.get("inertiaDiagonal")
-    known = {key: value for key, value in json.items() if key != "inertiaDiagonal" or any(inertia or ())}
+    is_given = any(read_vector(json, "inertiaDiagonal") or ())  # zeros are Godot's for none
+    known = {key: value for key, value in json.items() if key != "inertiaDiagonal" or is_given}
     motion = replace(read_motion(known), kinematic=kind == "kinematic")
     return replace(motion, mass=read_number(json, "mass", 1.0) or 1.0)

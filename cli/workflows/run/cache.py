@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
@@ -20,6 +21,7 @@ from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
 FORMAT = 1
+HASH = re.compile("[0-9a-f]{64}")
 TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# results of `gltf-anim run`: may be deleted\n"
 
 
@@ -35,6 +37,12 @@ class CacheRecord:
     size: int
     files: dict[str, str]
     is_plain: bool
+
+    def __post_init__(self) -> None:
+        """Raise TypeError for values of other types."""
+        is_hash = isinstance(self.product, str) and HASH.fullmatch(self.product)
+        if not is_hash or type(self.size) is not int or not isinstance(self.files, dict):
+            raise TypeError("is no record of a result")
 
 
 @dataclass
@@ -69,7 +77,7 @@ class ResultCache:
         """Return the record of a key if all files that its steps read are the same. folder: of relative paths."""
         try:
             record = CacheRecord(**json.loads(self._record(key).read_bytes()))
-        except (OSError, ValueError, TypeError):  # none, or of another version
+        except (OSError, ValueError, TypeError, RecursionError):  # none, or of another version
             return None
         same = all(hashes.hash(os.path.join(folder, path)) == digest for path, digest in record.files.items())
         return record if same else None

@@ -91,7 +91,7 @@ def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
     except OSError:
         return entries
     for line in lines:
-        with suppress(ValueError, TypeError):
+        with suppress(ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError):
             value = json.loads(line)
             stamps: dict[str, Any] = {
                 key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value

@@ -97,7 +97,7 @@ def _buffers(path: Path) -> list[Path]:
 def _read(path: Path) -> dict[str, Any]:
     try:
         value = json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     folders = value.get("folders") if isinstance(value, dict) else None
     return folders if isinstance(folders, dict) else {}

@@ -34,7 +34,7 @@ def prune(cache: ResultCache, limit: int) -> tuple[int, int]:
 
 def _delete_records(cache: ResultCache, products: dict[str, int]) -> None:
     for path, _ in _files(cache.results):
-        with suppress(OSError, ValueError, KeyError, TypeError):
+        with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
             if json.loads(path.read_bytes())["product"] in products:
                 path.unlink()
 
