@@ -13,12 +13,14 @@ from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
 from anim.model import VertexCache
 from anim.operations.selection import not_found
+from anim.show.page.bakes import bake_content, with_left_out
 from anim.show.page.comparison import compare_clips, compare_content
 from anim.show.page.notebook import cache_file, document_file
 from anim.show.page.page import EMPTY, SHOWS, PageContent, PageFile, PageView
 from anim.show.page.page import page as make_page
 from anim.show.page.paired_meshes import pair_cache_meshes
 
+NOT_SHOWN = "Only the meshes in the cache are shown."
 Shown: TypeAlias = Asset | Document | PathName | VertexCache
 
 
@@ -76,7 +78,9 @@ def _compare(one: PageFile, other: PageFile) -> PageContent:
     clips = reader.clips(one.document), reader.clips(other.document)
     if one.cache is not None or other.cache is not None:
         partners = {0: 0} if len(clips[0]) and len(clips[1]) == 1 else {}
-        return PageContent(partners=partners, meshes=pair_cache_meshes(one, other))
+        source = other if other.cache is None else one
+        content = bake_content(source, pair_cache_meshes(one, other), partners, is_first=source is one)
+        return with_left_out(content, reader.scene(source.document), NOT_SHOWN) if any(content.hidden) else content
     try:
         scenes = reader.scene(one.document), reader.scene(other.document)
         ruler = ErrorMetric(*scenes, clips=clips[0] + clips[1])

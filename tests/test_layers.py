@@ -95,7 +95,7 @@ PUBLIC = {
     "optimization.search": "plan",
     "optimization.tracks": "clip_ends needed_keys",
     "show.filmstrip": "camera clips filmstrip image_file",
-    "show.page": "comparison notebook page paired_meshes resources sources",
+    "show.page": "bakes comparison notebook page paired_meshes resources sources",
     "show.plots": (
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations simulation_plot "
         "stability_plot tangent_plot track_plot track_selection"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.model import Clip, Scene
+from anim.model import Clip, MeshInstance, Scene
 from anim.skinning.analysis.inbetween_error import InbetweenError
 from anim.skinning.analysis.method_deviation import Deviation
 from anim.skinning.bake import bakeable_instances
@@ -50,7 +50,20 @@ def left_out_note(scene: Scene, nodes: Sequence[int] | None, reporter: Reporter)
     lost = [each for each in bakeable_instances(scene, rigid=True, nodes=nodes) if each not in kept]
     if lost:
         count = sum(len(each.mesh.positions) for each in lost)
-        reporter.warn(f"skipped {count} vertices of unskinned meshes (include with --rigid)")
+        reporter.warn(_skipped_words(count))
+
+
+def only_baked_words(left_out: Sequence[MeshInstance], baked: str) -> str:
+    """Return a sentence for the page of a bake, with the warning of `bake` on the meshes that are not in it."""
+    count = sum(len(each.mesh.positions) for each in left_out)
+    rigid = sum(len(each.mesh.positions) for each in left_out if each.skin is None and not len(each.mesh.targets))
+    parts = [_skipped_words(rigid)] if rigid else []
+    parts += [f"skipped {count - rigid} vertices of other meshes"] if count > rigid else []
+    return f"Only the meshes in {baked} are shown: {', '.join(parts)}"
+
+
+def _skipped_words(count: int) -> str:
+    return f"skipped {count} vertices of unskinned meshes (include with --rigid)"
 
 
 def clamped_range_note(

@@ -8,10 +8,12 @@ from anim.errors import AnimError
 from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
+from anim.show.page.bakes import bake_content, left_out_instances, with_left_out
 from anim.show.page.comparison import compare_clips, compare_content
 from anim.show.page.page import EMPTY, PageContent, PageFile, PageView
 from anim.show.page.paired_meshes import PairedMeshes, pair_cache_meshes, pair_nodes
 from cli.io.scenes import read_scene
+from cli.reports import bake_notes
 from cli.text import Reporter, format_length
 from cli.workflows.vertex_motion import is_bake_of, node_pairs
 
@@ -29,7 +31,11 @@ def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: s
         if is_cached or is_bake_of(old, new, counts[1]) or is_bake_of(new, old, counts[0]):
             meshes = pair_cache_meshes(one, other) if is_cached else _pair_bake(old, new, counts[1])
             partners = {_played(clips, clip): 0} if len(clips[1]) == 1 else {}
-            return PageContent(partners=partners, meshes=meshes)
+            is_first = one.cache is None if is_cached else is_bake_of(old, new, counts[1])
+            source, scene, baked = (one, old, other) if is_first else (other, new, one)
+            content = bake_content(source, meshes, partners, is_first=is_first)
+            words = bake_notes.only_baked_words(left_out_instances(scene, content), baked.name)
+            return with_left_out(content, scene, words)
         ruler = ErrorMetric(old, new, clips=clips[0] + clips[1])
         return compare_content(ruler, *clips, compare_clips(ruler, *clips))
     except AnimError as error:
@@ -66,7 +72,8 @@ def _pair_bake(old: Scene, new: Scene, num_clips: int) -> PairedMeshes:
 
 def worst_view(file: PageFile, content: PageContent) -> PageView:
     """Return the view of the largest error, with heat: paused there if there is one."""
-    link = next((row.link for panel in content.panels for row in panel.rows if row.link is not None), None)
+    links = (row.link for panel in content.panels for row in panel.rows if row.link is not None)
+    link = next((link for link in links if link.clip is not None), None)
     if link is None or link.clip is None:
         clip = next(iter(content.partners), 0)
         names = reader.names(file.document)

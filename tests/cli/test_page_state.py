@@ -114,6 +114,23 @@ def test_bones_begin_at_joints_with_vertices(asset: Find, call: Call, tmp_path: 
     assert not [link for link in bones if "IK" in link or "control" in link or link.startswith("root ")]
 
 
+def test_meshes_that_are_not_in_a_bake_are_not_drawn(call: Call, tmp_path: Path) -> None:
+    """Neither in the picture nor by its camera; bones, and nodes below those of such meshes, stay."""
+    document = container.read(np.frombuffer(built("biped"), np.uint8))
+    count = len(document.json["nodes"])
+    statue = {"name": "statue", "mesh": 0, "translation": [40, 0, 0]}
+    scenes = [{**each, "nodes": [*each["nodes"], count]} for each in document.json["scenes"]]
+    json = {**document.json, "nodes": [*document.json["nodes"], statue], "scenes": scenes}
+    path, page = tmp_path / "a.glb", tmp_path / "b.html"
+    path.write_bytes(b"".join(piece.tobytes() for piece in container.glb(replace(document, json=json))))
+    call("bake", path, tmp_path / "a.npz", "--clip", "walk", "--fps", "6", "--html", page)
+    tag = "document.querySelector('#tag-a').textContent"
+    drawn = "(player.draw(), player.stage.renderer.info.render.calls)"
+    codes = ["player.stage.radius < 10", "player.sides.map((side) => side.meshes.length)", tag]
+    found = evaluate(page, [("#t=0&side=a", [*codes, drawn])])
+    assert found == [[True, [5, 1], "a.glbwithout 1 mesh", 6]]  # with the floor
+
+
 def test_arrows_leave_out_folded_rows_and_show_those_below_the_filter(
     fixture: Fixture, call: Call, tmp_path: Path
 ) -> None:

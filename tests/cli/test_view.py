@@ -11,17 +11,21 @@ import re
 import threading
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from anim.gltf.reading.reader import scene
 from anim.show.page import resources
 from cli.io import browser
+from cli.reports.bake_notes import only_baked_words
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, refusal
 from tests.cli.test_table import BVH, CURVES, renamed
+from tests.files import glb_of, opened_fixture
 from tests.fixtures.reading import split
 from tests.pages import needs_page
 
@@ -259,6 +263,48 @@ def test_a_bake_beside_its_source(fixture: Fixture, call: Call, tmp_path: Path) 
     report = json.loads(call("diff", fixture("biped"), cache, "--clip", "wave", "--format", "json").product())
     assert curve["max"] == report["max_error_m"] == pytest.approx(max(curve["errors"]), rel=1e-6)
     assert said["view"]["t"] == report["clips"][0]["time_s"]
+
+
+@needs_page
+def test_the_page_of_a_bake_shows_what_is_in_it_and_warns_of_the_rest(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _write_with_statue(Path("a.glb"))
+    options = ("--clip", "wave", "--fps", "4", "--html", "b.html")
+    warning = "skipped 3818 vertices of unskinned meshes (include with --rigid)"
+    assert warning in call("bake", "a.glb", "a.npz", *options).err
+    call("view", "a.glb", "a.npz", "--clip", "wave", "-o", "v.html").product()
+    for name, place in (("b.html", 1), ("v.html", 0)):
+        said = facts(Path(name).read_bytes())
+        assert said["hidden"] == [[STATUE], []]
+        panel = said["panels"][place]
+        assert panel["about"] == f"Only the meshes in a.npz are shown: {warning}"
+        (row,) = panel["rows"]
+        assert (row["cells"], row["link"]["node"]) == (["statue", "3818 vertices"], STATUE)
+    call("view", "a.npz", "a.glb", "-o", "w.html").product()
+    assert facts(Path("w.html").read_bytes())["hidden"] == [[], [STATUE]]
+    call("bake", "a.glb", "a.npz", *options, "--rigid")
+    assert "hidden" not in facts(Path("b.html").read_bytes())
+    call("bake", "a.glb", "part.glb", *options, "--mesh", "body*")
+    assert facts(Path("b.html").read_bytes())["hidden"] == [[STATUE], []]
+
+
+def test_skinned_meshes_that_a_page_of_a_bake_leaves_out_are_counted_too() -> None:
+    words = only_baked_words(scene(opened_fixture("biped")).instances, "part.npz")
+    assert words == "Only the meshes in part.npz are shown: skipped 3818 vertices of other meshes"
+
+
+STATUE = 22  # index of a node
+
+
+def _write_with_statue(path: Path) -> None:
+    """The biped, and its mesh once more without a skin."""
+    json = opened_fixture("biped").json
+    assert len(json["nodes"]) == STATUE
+    nodes = [*json["nodes"], {"name": "statue", "mesh": 0, "translation": [1, 0, 0]}]
+    scenes = [{**each, "nodes": [*each["nodes"], STATUE]} for each in json["scenes"]]
+    path.write_bytes(glb_of(replace(opened_fixture("biped"), json={**json, "nodes": nodes, "scenes": scenes})))
 
 
 @needs_page

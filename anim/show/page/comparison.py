@@ -91,12 +91,12 @@ def vertex_content(content: PageContent, found: VertexDistance, *, clip: int, la
     """
     if found.max_error <= MIN_ERROR_PER_DIAGONAL * found.diagonal:
         panel = PagePanel("Largest errors", (PageRow(("no vertex moves differently",)),))
-        return replace(content, panels=(*content.panels, panel), errors={clip: ClipError(0.0)})
+        return replace(content, panels=(panel, *content.panels), errors={clip: ClipError(0.0)})
     cells = (label, f"p99 {_length(found.p99)}", f"{found.time:.3f} s", _length(found.max_error))
     panel = PagePanel("Largest errors", (PageRow(cells, PageLink(clip, None, found.time)),), hot=len(cells) - 1)
     curve = _reduce(np.array(found.times), np.array(found.errors))
     error = ClipError(found.max_error, *curve, time=found.time)
-    return replace(content, panels=(*content.panels, panel), errors={clip: error})
+    return replace(content, panels=(panel, *content.panels), errors={clip: error})
 
 
 def _measured(ruler: ErrorMetric) -> str:

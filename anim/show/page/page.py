@@ -121,6 +121,7 @@ class PageContent:
     the first.
     meshes: nodes of each file whose meshes correspond vertex by vertex, in this order; None: all meshes of a file.
     Without `meshes` the page pairs meshes by name and number of vertices.
+    hidden: nodes of each file whose meshes are not shown.
     """
 
     subtitle: str = ""
@@ -129,6 +130,7 @@ class PageContent:
     partners: Mapping[int, int] = field(default_factory=dict)
     meshes: tuple[MeshNodes, MeshNodes] | None = None
     figures: Mapping[int, Sequence[ClipFigure]] = field(default_factory=dict)
+    hidden: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
 
 
 EMPTY = PageContent()
@@ -208,6 +210,7 @@ def _content(content: PageContent) -> dict[str, Any]:
         "partners": dict(content.partners),
         "figures": {i: [asdict(each) for each in figures] for i, figures in content.figures.items()},
         **({} if content.meshes is None else {"meshes": content.meshes}),
+        **({"hidden": content.hidden} if any(content.hidden) else {}),
     }
 
 

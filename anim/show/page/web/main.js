@@ -5,7 +5,7 @@ import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.j
 import { bindings, fit, frame, isDark } from "./bindings.js";
 import { markClip, sortClips } from "./clips.js";
 import { facts, hasNodes, readFile } from "./data.js";
-import { $, setPressed } from "./dom.js";
+import { $, make, setPressed } from "./dom.js";
 import { formatLength } from "./format.js";
 import { GRADIENT } from "./heat.js";
 import { listenToKeys, openSheet } from "./keyboard.js";
@@ -162,6 +162,11 @@ function begin(player) {
   if (!state.playing) markLink(state.clip, state.time);
 }
 
+/** Name meshes that are not shown beside the picture. */
+function nameHidden(tag, count) {
+  if (count) tag.append(make("i", { class: "dim" }, `without ${count} ${count === 1 ? "mesh" : "meshes"}`));
+}
+
 async function main() {
   const root = document.documentElement;
   root.dataset.theme = isDark() ? "dark" : "light";
@@ -169,11 +174,12 @@ async function main() {
   const sides = [];
   for (const [i, id] of ["a", "b"].entries()) {
     const bytes = await readFile(id);
-    if (bytes) sides.push(new Side(await loader.parseAsync(bytes, ""), facts.files[i]));
+    if (bytes) sides.push(new Side(await loader.parseAsync(bytes, ""), facts.files[i], facts.hidden?.[i]));
   }
   document.body.classList.toggle("pair", sides.length > 1);
   document.body.classList.toggle("cache", !hasNodes(facts));
   document.body.classList.toggle("static", !sides[0].clips.length);
+  for (const [i, { numHidden }] of sides.entries()) nameHidden($(i ? "#tag-b" : "#tag-a"), numHidden);
   $("#legend .scale").style.background = GRADIENT;
   const player = new Player(sides);
   player.firstTab = fillSidebar(sides, facts, actions(player));

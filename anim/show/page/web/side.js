@@ -4,7 +4,8 @@ import { AnimationMixer, DirectionalLight, Group, HemisphereLight, Scene } from 
 import { lookOf } from "./materials.js";
 
 export class Side {
-  constructor(gltf, about) {
+  /** hidden: indices of nodes whose meshes are not shown. */
+  constructor(gltf, about, hidden = []) {
     this.gltf = gltf;
     this.name = about.name;
     this.clips = gltf.animations;
@@ -13,15 +14,20 @@ export class Side {
     this.scene = new Scene();
     this.overlay = new Group(); // skeleton, onion skins: drawn above the model
     this.scene.add(this.root, this.overlay, ...lights());
-    this.meshes = [];
+    const meshes = [];
     this.root.traverse((object) => {
       object.name ||= object.uuid; // which clones, onion skins, find their tracks by
-      if (object.isMesh) this.meshes.push(object);
+      if (object.isMesh) meshes.push(object);
     });
-    for (const mesh of this.meshes) prepareMesh(mesh);
+    for (const mesh of meshes) prepareMesh(mesh);
     for (const clip of this.clips) clip.tracks.forEach(normalizeRotations);
     this.nodes = nodesOf(gltf);
     this.owners = ownersOf(this.nodes); // node index by mesh
+    this.numHidden = hidden.length;
+    const isHidden = (mesh) => hidden.includes(this.owners.get(mesh));
+    this.meshes = meshes.filter((mesh) => !isHidden(mesh));
+    // Not by `visible`, which would hide the children of their nodes too
+    for (const mesh of meshes.filter(isHidden)) mesh.layers.disableAll();
     this.mixer = new AnimationMixer(this.root);
     this.action = null;
   }
