@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
@@ -21,6 +21,7 @@ RETRY_FACTOR = 0.97  # applied to bound / measured error for the next search
 NEW_VERTEX_RETRY_FACTOR = 0.995  # the same if the worst vertex was not among the measured points
 MAX_REDUCED_KEY_FRACTION = 0.5  # of the source's keys; below it the lossless version cannot be smaller
 MAX_ROUNDS = 6  # of search and verification; a clip that fails the last one is stored losslessly
+UNVERIFIED = Verification(MotionError(0.0, 0.0, "", "", 0), "", None, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +46,25 @@ class ClipOptimizer:
     """Data shared by all clips of a file in one process; each part is computed on first use.
 
     before, after: the scene in its original and in its new rest pose. clips: all of the file. detailed: whether
-    verifications include statistics.
+    verifications include statistics. verified: whether errors are measured; else every result passes, for its size.
     """
 
     def __init__(
-        self, request: Request, before: Scene, after: Scene, clips: tuple[Clip, ...], *, detailed: bool = False
+        self,
+        request: Request,
+        before: Scene,
+        after: Scene,
+        clips: tuple[Clip, ...],
+        *,
+        detailed: bool = False,
+        verified: bool = True,
     ) -> None:
         self.request = request
         self.before = before
         self.after = after
         self.clips = clips
         self.detailed = detailed
+        self.verified = verified
 
     def context(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Context:
         """Return the search context; extra: additional points, (index of the surface, index of the vertex)."""
@@ -65,6 +74,8 @@ class ClipOptimizer:
 
     def verify(self, number: int, after: Clip) -> Verification:
         """Return the error of a new version of clip `number` against its source."""
+        if not self.verified:
+            return UNVERIFIED
         return verify(
             self._ruler,
             self.clips[number],
@@ -125,13 +136,14 @@ def optimize_clip(optimizer: ClipOptimizer, item: tuple[int, Task]) -> ClipResul
         if (each := _search_within_bounds(optimizer, number, task, effort)) is not None
     ]
     best = min(found, key=lambda each: each.solution.size(context.coding), default=None)
-    if best is not None and _keys(best.solution.clip) < MAX_REDUCED_KEY_FRACTION * _keys(task.clip):
+    is_exact = context.bounds.max_error == 0
+    if best is not None and (is_exact or _keys(best.solution.clip) < MAX_REDUCED_KEY_FRACTION * _keys(task.clip)):
         return best
     exact = solve(replace(context, bounds=replace(context.bounds, max_error=0.0)), task)
     assert exact is not None
     if best is not None and best.solution.size(context.coding) <= exact.size(context.coding):
         return best
-    if best is None and optimizer.request.bounds.max_error > 0:
+    if best is None and not is_exact:
         return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=True)
     return _verify(optimizer, number, exact)
 

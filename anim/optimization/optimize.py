@@ -18,6 +18,7 @@ from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
 from anim.optimization.search.plan import Solution
 from anim.optimization.shared_constants import find_constants
+from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification
 from anim.optimization.writing import changed_clips, write_solutions
 
@@ -39,6 +40,11 @@ class Optimized:
     without_loss: tuple[int, ...] = ()
     unchanged: bool = False
 
+    def sizes(self, request: Request) -> dict[int, float]:
+        """Return the approximate number of bytes of each solution of a request, by index of the clip."""
+        coding = Encoding(request.packing, BYTE_COSTS[request.objective])
+        return {number: each.size(coding) for number, each in self.solutions.items()}
+
 
 def optimize(
     document: Document,
@@ -50,13 +56,15 @@ def optimize(
     workers: int = 1,
     start: str = "spawn",
     detailed: bool = False,
+    verified: bool = True,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Optimized:
     """Return the document with smaller animations, each within the bounds as measured on the written data.
 
     scene, clips: of the document. chosen: indices of the clips to optimize, all by default. workers: number of
     processes; the result is the same for any number. start: start method of `multiprocessing`. detailed: verifications
-    with statistics. progress: called with the fraction done.
+    with statistics. verified: whether errors are measured; without, only sizes are of use. progress: called with the
+    fraction done.
     A clip without a lossy solution within all bounds is stored losslessly. Output of the same request comes back
     unchanged.
     """
@@ -66,7 +74,8 @@ def optimize(
         return Optimized(document, {}, {}, unchanged=True)
     request = _visible_clips(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
-    optimizer = ClipOptimizer(request, scene, base.scene if base else scene, tuple(clips), detailed=detailed)
+    after = base.scene if base else scene
+    optimizer = ClipOptimizer(request, scene, after, tuple(clips), detailed=detailed, verified=verified)
     tasks = _tasks(optimizer, chosen)
     first = _first_equal(tasks)
     distinct = [task for n, task in enumerate(tasks) if first[n] == n]

@@ -1,4 +1,4 @@
-"""Rate-distortion curve of a file, and the smallest error within a byte limit."""
+"""Rate-distortion curve of a file, and the smallest error bound within a byte limit."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ ERROR_FRACTIONS = tuple(
     10.0 ** (-exponent / 2) for exponent in range(10, 3, -1)
 )  # of the diagonal: 1e-5 to 1e-2, two a decade
 MIN_BOUND_PER_DIAGONAL, MAX_BOUND_PER_DIAGONAL = 1e-6, 0.1  # range of the search
-FIRST_BOUND_PER_DIAGONAL = 1e-3  # of the search
-SIZE_TOLERANCE = 1e-3  # of the animation's bytes: fewer unused ones are not worth another search
-LOG_BOUND_TOLERANCE = 0.0225  # of the bound's natural logarithm: within 2 % of the smallest such bound
+TABLE_FRACTIONS = tuple(10.0 ** (k / 4 - 6) for k in range(21))  # of the diagonal: that range, four a decade
+FIRST_ENTRY, FIRST_STEP = 12, 4  # of the table: 1e-3 of the diagonal, and its neighbors a decade apart
+SIZE_MARGIN = 3e-3  # of the animation's bytes: sizes between two entries are estimates
+BOUND_STEP_FACTOR = 1.05  # between the bounds that a search may return
+BOUND_EXPONENT_PER_SIZE = 16.0  # a bound 17 % larger saves about a percent of the animation's bytes
+MAX_STEP_FACTOR = 4.0  # of a bound whose result was too large
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,36 +39,107 @@ def curve(
         yield tried(fraction * diagonal)
 
 
-def smallest_error(max_bytes: int, diagonal: float, tried: Callable[[float], RatePoint]) -> RatePoint | None:
-    """Return the smallest bound found that takes at most `max_bytes`; None if there is none.
+def smallest_bound(
+    max_bytes: int,
+    diagonal: float,
+    sized: Callable[[float], RatePoint],
+    ratio: Callable[[float], float],
+    *,
+    usual_ratio: float = 1.0,
+) -> float | None:
+    """Return the smallest bound, m, whose result is likely to take at most `max_bytes`; None if there is none.
 
-    Bounds go up to a tenth of the diagonal. Sizes decrease with the bound's logarithm except for the noise of the
-    search, a few percent: the bound is interpolated between the nearest ones that are too small and large enough, and
-    the interval between them is bisected where that did not halve it. Stops within LOG_BOUND_TOLERANCE of the smallest
-    bound, or when at most SIZE_TOLERANCE of the animation's bytes are unused.
+    sized: size at a bound, from a quick search. ratio: animation bytes of the final search as a fraction of those, at a
+    bound. usual_ratio: the same before any was measured. Sizes are tried at bounds of one table only, and in between
+    estimated from its neighbors, so that the result never increases with `max_bytes`.
     """
-    exact = tried(0.0)
-    if exact.size <= max_bytes:
-        return exact
-    low, high = math.log(MIN_BOUND_PER_DIAGONAL * diagonal), math.log(MAX_BOUND_PER_DIAGONAL * diagonal)
-    best, over, at = None, exact.size, math.log(FIRST_BOUND_PER_DIAGONAL * diagonal)
-    while best is None:
-        found = tried(math.exp(at))
-        if found.size <= max_bytes:
-            best, high = found, at
-        elif at >= high:
+    if sized(0.0).size <= max_bytes:
+        return 0.0
+    if not diagonal:
+        return None
+    table = _SizeTable(diagonal, sized)
+    last = len(TABLE_FRACTIONS) - 1
+    first = _first_entry(lambda entry: table.size(entry, usual_ratio) <= max_bytes)
+    for entry in range(first, last + 1):
+        bound = table.bound_before(entry, max_bytes, ratio(table.bound(entry)))
+        if bound is not None:
+            return min(_rounded(bound, diagonal), table.bound(entry))
+    return table.bound(last) if table.size(last, 1.0) <= max_bytes else None
+
+
+def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) -> float:
+    """Return a larger bound, m, after the result at `bound`, which takes more than `max_bytes`."""
+    animation = max(point.animation - (point.size - max_bytes), 1)
+    excess = min(point.animation / animation, 2.0)
+    factor = min(max(excess**BOUND_EXPONENT_PER_SIZE, BOUND_STEP_FACTOR), MAX_STEP_FACTOR)
+    return _rounded(max(bound, MIN_BOUND_PER_DIAGONAL * diagonal) * factor, diagonal)
+
+
+class _SizeTable:
+    """Sizes at the bounds of the table, each found on first use."""
+
+    def __init__(self, diagonal: float, sized: Callable[[float], RatePoint]) -> None:
+        self._diagonal = diagonal
+        self._sized = sized
+        self._found: dict[int, RatePoint] = {}
+
+    def bound(self, entry: int) -> float:
+        """Return the bound, m, of an entry."""
+        return float(TABLE_FRACTIONS[entry] * self._diagonal)
+
+    def size(self, entry: int, ratio: float) -> float:
+        """Return the bytes of the file if its animation takes `ratio` times those of the quick search."""
+        point = self._point(entry)
+        return point.size - (1 - ratio) * point.animation
+
+    def bound_before(self, entry: int, max_bytes: int, ratio: float) -> float | None:
+        """Return the bound, m, of `max_bytes` between an entry and the one before; None above the entry.
+
+        Animation bytes are linear in between, both logarithmic.
+        """
+        high = self._point(entry)
+        limit = max_bytes - SIZE_MARGIN * high.animation - (high.size - high.animation)
+        if ratio * high.animation > limit:
             return None
+        if not entry:
+            return self.bound(entry)
+        low = self._point(entry - 1)
+        if ratio * low.animation <= limit:
+            return self.bound(entry - 1)
+        fraction = math.log(ratio * low.animation / limit) / math.log(low.animation / high.animation)
+        return float(self.bound(entry - 1) * (self.bound(entry) / self.bound(entry - 1)) ** fraction)
+
+    def _point(self, entry: int) -> RatePoint:
+        if entry not in self._found:
+            self._found[entry] = self._sized(self.bound(entry))
+        return self._found[entry]
+
+
+def _first_entry(fits: Callable[[int], bool]) -> int:
+    """Return the first entry of the table that fits, or its length; entries after one that fits count as fitting.
+
+    The order of entries depends on nothing but earlier answers: more that fit never lead to a later entry.
+    """
+    count = len(TABLE_FRACTIONS)
+    low, high = -1, count
+    while high - low > 1:
+        if low < 0 and high == count:
+            entry = FIRST_ENTRY
+        elif low < 0:
+            entry = max(high - FIRST_STEP, 0)
+        elif high == count:
+            entry = min(low + FIRST_STEP, count - 1)
         else:
-            low, over, at = at, found.size, high
-    width = math.inf
-    while high - low > LOG_BOUND_TOLERANCE and max_bytes - best.size > SIZE_TOLERANCE * best.animation:
-        fraction = (over - max_bytes) / (over - best.size) if high - low <= width / 2 else 0.5
-        width = high - low
-        margin = 0.95 * LOG_BOUND_TOLERANCE  # a bound next to the end of the interval can close it
-        at = min(max(low + fraction * width, low + margin), high - margin)
-        found = tried(math.exp(at))
-        if found.size <= max_bytes:
-            best, high = found, at
+            entry = (low + high) // 2
+        if fits(entry):
+            high = entry
         else:
-            low, over = at, found.size
-    return best
+            low = entry
+    return high
+
+
+def _rounded(bound: float, diagonal: float) -> float:
+    """The bound, m, rounded up to one of few: near byte limits then give the same result."""
+    step = math.log(BOUND_STEP_FACTOR)
+    largest = MAX_BOUND_PER_DIAGONAL * diagonal
+    return min(diagonal * math.exp(step * math.ceil(math.log(bound / diagonal) / step - 1e-9)), largest)

@@ -15,6 +15,7 @@ from cli.options import common
 from cli.reports import optimize_report
 from cli.text import Reporter
 from cli.workflows import many_files, optimize_job, optimize_outputs
+from cli.workflows.byte_limit import ByteLimit
 from cli.workflows.edit_clips import note_images
 from cli.workflows.rate_curve import write_curve
 
@@ -202,7 +203,7 @@ def command(
                 found = work.run(wanted)
             else:
                 ceiling = None if max_error is None else wanted.bounds.max_error
-                wanted, found = work.fitted(wanted, max_count, ceiling=ceiling)
+                wanted, found = ByteLimit(work, max_count).run(wanted, ceiling=ceiling)
             optimize_report.check(found, work.clips, wanted, work.scale)
             about = optimize_outputs.describe(work, wanted, found, began)
             with optimize_outputs.write_report(about, reporter, report, dry_run=dry_run):

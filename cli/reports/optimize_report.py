@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from anim.gltf.document import Document
@@ -82,13 +82,6 @@ def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: floa
             f"{reader.clip_label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
             f"{off.time:.3f} s (bound {format_length(request.bounds.max_error)}); nothing was written"
         )
-
-
-def smaller(found: Optimized, document: Document, size_of: Callable[[Document], int]) -> Document:
-    """Return the optimized document, or the old one if it takes no more bytes."""
-    if found.unchanged or size_of(found.document) >= size_of(document):
-        return document
-    return found.document
 
 
 def retained_keys(document: Document, clips: Iterable[int]) -> str:

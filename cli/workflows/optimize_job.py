@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from anim.files import signals
 from anim.gltf.document import Document
@@ -17,20 +18,19 @@ from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.optimization.optimize import Optimized, optimize
 from anim.optimization.options import Bounds, Request
-from anim.optimization.rate_distortion import MAX_BOUND_PER_DIAGONAL, RatePoint, smallest_error
-from anim.units import format_number, is_zero, plural
+from anim.optimization.rate_distortion import RatePoint
+from anim.units import is_zero
 from cli import units
-from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress
 from cli.reports import optimize_report
 from cli.streams import step_streams
-from cli.text import Reporter, format_length
+from cli.text import Reporter
 
 DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OptimizeJob:
     """A file, its selected clips, and its output.
 
@@ -47,71 +47,53 @@ class OptimizeJob:
     detailed: bool
     progress: Progress
 
-    def run(self, request: Request) -> Optimized:
-        """Return the result of the search."""
+    def run(self, request: Request, *, chosen: Sequence[int] | None = None, verified: bool = True) -> Optimized:
+        """Return the result of the search. chosen: indices of the clips, if not all of the job's."""
+        chosen = self.chosen if chosen is None else chosen
         with signals.ignore_broken_pipes():
             found = optimize(
                 self.source.document,
                 self.scene,
                 self.clips,
                 request,
-                chosen=self.chosen,
-                workers=self.workers if optimize_report.is_long(self.clips, self.chosen) else 1,
-                detailed=self.detailed,
+                chosen=chosen,
+                workers=self.workers if optimize_report.is_long(self.clips, chosen) else 1,
+                detailed=self.detailed and verified,
+                verified=verified,
                 start="fork" if sys.platform == "linux" else "spawn",
                 progress=lambda share: self.progress(round(1000 * share)),
             )
         self.progress.close()
         return found
 
-    def smaller(self, found: Optimized) -> Document:
-        """Return the optimized document, or the source if that takes no more bytes."""
-        return optimize_report.smaller(found, self.source.document, self.size)
+    def result(self, found: Optimized) -> tuple[Document, int]:
+        """Return the optimized document, or the source if that takes no more bytes, with its size in bytes."""
+        size = self.size(found.document)
+        if found.unchanged or size >= self._source_size:
+            return self.source.document, self._source_size
+        return found.document, size
 
     def size(self, document: Document) -> int:
         """Return the size in bytes of a document as written."""
         return documents.write(document, self.output, self.source, dry_run=True)
 
+    @cached_property
+    def _source_size(self) -> int:
+        return self.size(self.source.document)
+
+    def point(self, max_error: float, found: Optimized) -> RatePoint:
+        """Return the rate-distortion point of a result within a bound, in m."""
+        document, size = self.result(found)
+        error = 0.0 if document is self.source.document else optimize_report.worst(found)  # the source moves no vertex
+        return RatePoint(max_error, size, error, optimize_report.cost(document))
+
     def sized(self, request: Request, max_error: float) -> RatePoint:
         """Return the rate-distortion point of a bound, in m, by a fast search."""
-        found = self.run(replace(_bounded(request, max_error), effort="fast"))
-        smaller = self.smaller(found)
-        error = 0.0 if smaller is self.source.document else optimize_report.worst(found)  # the source moves no vertex
-        return RatePoint(max_error, self.size(smaller), error, optimize_report.cost(smaller))
-
-    def fitted(self, request: Request, max_bytes: int, *, ceiling: float | None) -> tuple[Request, Optimized]:
-        """Return the request and the result with the smallest error that fits into `max_bytes`.
-
-        ceiling: m, the greatest allowed error; None for a tenth of the diagonal. Raises CheckError if nothing fits.
-        """
-        most = MAX_BOUND_PER_DIAGONAL * self.scale if ceiling is None else ceiling
-        if ceiling is not None:
-            self._check_fit(self.sized(request, most), max_bytes)
-        best = smallest_error(max_bytes, self.scale, lambda max_error: self.sized(request, max_error))
-        if best is None:
-            self._check_fit(self.sized(request, most), max_bytes)
-        bound = most if best is None else min(best.max_error, most)
-        request = _bounded(request, bound)
-        found = self.run(request)
-        if self.size(self.smaller(found)) > max_bytes:  # the fast search fits, but a longer one can give another result
-            found = self.run(replace(request, effort="fast"))
-        return request, found
-
-    def _check_fit(self, sized: RatePoint, max_bytes: int) -> None:
-        if sized.size > max_bytes:
-            percent = f" ({format_number(100 * sized.max_error / self.scale, 2)} %)" if self.scale else ""
-            kept = optimize_report.retained_keys(self.source.document, self.chosen)
-            raise CheckError(
-                f"doesn't fit {plural(max_bytes, 'byte')}: "
-                f"with an error of up to {format_length(sized.max_error)}{percent} it still takes "
-                f"{plural(sized.size, 'byte')}, {sized.animation} of them animation; "
-                f"{kept}{'; ' if kept else ''}nothing was written",
-                help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {sized.size}",
-            )
+        return self.point(max_error, self.run(replace(with_bound(request, max_error), effort="fast")))
 
 
-def _bounded(request: Request, max_error: float) -> Request:
-    """The request with a computed bound in metres."""
+def with_bound(request: Request, max_error: float) -> Request:
+    """Return the request with a computed bound in metres."""
     return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
 
 

@@ -56,9 +56,10 @@ class OptimizeOutputs:
 
 def describe(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:
     """Return the report on an optimization."""
-    source, result = work.source, work.smaller(found)
+    source = work.source
+    result, size = work.result(found)
     name = source.name if work.output == documents.PIPE else work.output
-    size, measured_at = work.size(result), is_measured_at(work.scene)
+    measured_at = is_measured_at(work.scene)
     seconds = time.perf_counter() - began
     return optimize_report.OptimizeReport(
         name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, measured_at

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from anim.optimization.options import EFFORTS, Effort
+from anim.gltf.io import container
+from anim.optimization.optimize import Optimized
+from anim.optimization.options import EFFORTS, Effort, Request
+from cli.workflows.optimize_job import OptimizeJob
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import refusal
@@ -43,6 +47,27 @@ def test_a_search_that_ends_elsewhere_still_fits(
     assert (tmp_path / "out.glb").stat().st_size <= limit
     assert call("optimize", tmp_path / "out.glb", tmp_path / "again.glb", "--max-bytes", str(limit)).code == 0
     assert (tmp_path / "again.glb").read_bytes() == (tmp_path / "out.glb").read_bytes()
+
+
+def test_one_full_search_with_verification(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All sizes before it come from fast searches whose errors are not measured, or from a few of the clips."""
+    runs, run = [], OptimizeJob.run
+
+    def counted(job: OptimizeJob, request: Request, **options: Any) -> Optimized:
+        runs.append((request.effort, options.get("verified", True), len(options.get("chosen", job.chosen))))
+        return run(job, request, **options)
+
+    monkeypatch.setattr(OptimizeJob, "run", counted)
+    source, output = fixture("noop"), tmp_path / "out.glb"
+    assert call("optimize", source, output, "--max-bytes", "5600").code == 0
+    clips = len(container.read(source.read_bytes()).json["animations"])
+    assert output.stat().st_size <= 5600
+    assert [each for each in runs if each[1]] == [("balanced", True, clips)]
+    assert sum(each[0] == "balanced" for each in runs) <= 3
+    assert all(count <= -(-clips // 4) for effort, verified, count in runs if effort == "balanced" and not verified)
+    assert len(runs) <= 9
 
 
 def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
