@@ -1,6 +1,6 @@
 // The list of clips: seconds, errors, figures of `inspect`; filtered and sorted.
 
-import { make, setPressed } from "./dom.js";
+import { breakable, make, setPressed } from "./dom.js";
 import { filtered } from "./filter.js";
 import { formatLength, formatTime } from "./format.js";
 import { state, update } from "./state.js";
@@ -84,9 +84,4 @@ function figures(list) {
     make("span", { class: i < NUM_BRIEF ? "figure" : "figure more" }, `${label} `, make("b", {}, text)),
   );
   return make("span", { class: "figures" }, ...pairs);
-}
-
-/** A name that may break behind its punctuation. */
-function breakable(name) {
-  return name.split(/(?<=[_.:|-])/).flatMap((part) => [part, make("wbr")]);
 }

@@ -13,6 +13,11 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** Parts of a text that may break behind the punctuation of its names. */
+export function breakable(text) {
+  return text.split(/(?<=[_.:|-])/).flatMap((part) => [part, make("wbr")]);
+}
+
 export function setPressed(element, isPressed) {
   element?.setAttribute("aria-pressed", isPressed ? "true" : "false");
 }

@@ -149,12 +149,12 @@ function begin(player) {
   const { theme, unit, speed, loop } = asked;
   update({ theme, unit, speed, loop, tab: player.firstTab, sort: asked.sort, side: asked.side });
   if (side.clips.length) player.chooseClip(Math.max(clip, 0), asked.time ?? 0);
-  fit(player);
+  const show = [...asked.show].filter((name) => hasNodes(facts) || !OF_NODES.includes(name));
+  update({ node: node?.index ?? null, show: new Set(show) });
+  fit(player); // of the picture's height above curves
   if (asked.camera) player.stage.moveCamera(asked.camera);
   player.resetHeatScale();
   if (asked.scale) update({ heatScale: asked.scale });
-  const show = [...asked.show].filter((name) => hasNodes(facts) || !OF_NODES.includes(name));
-  update({ node: node?.index ?? null, show: new Set(show) });
   if (asked.tab && document.getElementById(`tab-${asked.tab}`)) update({ tab: asked.tab }); // curves without a node chose another
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   update({ playing: side.clips.length > 0 && asked.time === null && !isCalm });

@@ -2,7 +2,7 @@
 
 import { clipList } from "./clips.js";
 import { hasNodes } from "./data.js";
-import { $, make, setPressed } from "./dom.js";
+import { $, breakable, make, setPressed } from "./dom.js";
 import { filtered } from "./filter.js";
 import { formatBytes } from "./format.js";
 import { state, update } from "./state.js";
@@ -129,10 +129,10 @@ function panelSection(panel, { follow }) {
   const rows = panel.rows.map(({ cells, text, advice, link, level, parts = [] }) => {
     const [name, ...others] = cells;
     const columns = [
-      make("span", { class: "name" }, name),
+      make("span", { class: "name" }, ...breakable(name)),
       level ? make("span", { class: "dim" }, level) : null,
       ...others.map((cell, i) => make("span", { class: panel.hot === i + 1 ? "hot" : "dim" }, cell)),
-      text ? make("span", { class: "text" }, text) : null,
+      text ? make("span", { class: "text" }, ...breakable(text)) : null,
       advice ? make("span", { class: "text dim" }, ...unbroken(advice)) : null,
     ];
     // A position or a finding, whose name has a line of its own
