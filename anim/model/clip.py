@@ -38,7 +38,7 @@ class Clip:
     @property
     def time_axes(self) -> tuple[TimeAxis, ...]:
         """Distinct time axes, in the order of the tracks."""
-        return tuple(dict.fromkeys(track.time_axis for track in self.tracks))
+        return tuple(dict.fromkeys([track.time_axis for track in self.tracks]))
 
     @property
     def key_times(self) -> Floats:

@@ -83,7 +83,7 @@ def write_report(
 
 
 def report_result(about: optimize_report.OptimizeReport, reporter: Reporter, *, dry_run: bool) -> None:
-    for line in optimize_report.lines(about, dry_run=dry_run):
+    for line in () if reporter.quiet else optimize_report.lines(about, dry_run=dry_run):
         reporter.info(line)
     for words in optimize_report.warnings(about):
         reporter.warn(words)

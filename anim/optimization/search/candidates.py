@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.optimization.options import Packing
 from anim.optimization.search import playback
 from anim.optimization.search.key_fit import KeyFit
@@ -36,6 +36,7 @@ class Candidates:
         self._source = source
         self._packing = packing
         self._paths = [PATHS.index(each.path) for each in source.moving]
+        self._values, self._rows = _stacked(source, self._paths)
         self._closures = np.array([each.closure for each in source.moving])
         self._intervals: dict[bytes, KeyInterval] = {}
         self._fits: dict[bytes, KeyFit] = {}
@@ -98,7 +99,7 @@ class Candidates:
             new = [i for i in axis.members if self._paths[i] == path and (name, i) not in self._keys]
             if not new:
                 continue
-            values = np.stack([self._source.moving[i].values for i in new], axis=1)
+            values = self._values[path][:, self._rows[new]]
             keys = values[at]
             if not axis.keys.all():
                 fit = self._fit_on(axis, name)
@@ -125,6 +126,16 @@ class Candidates:
             self._intervals[name] = find_interval(self._source.grid[axis.keys], self._source.at)
             self._num_cached += 4 * len(self._source.at)
         return self._intervals[name]
+
+
+def _stacked(source: SourceMotion, paths: Sequence[int]) -> tuple[list[Floats], Ints]:
+    """The values (W, G', C) of all tracks of each path, and the index (G,) of each track among them."""
+    values, rows = [], np.zeros(len(paths), np.int64)
+    for path in range(len(PATHS)):
+        mine = [i for i, each in enumerate(paths) if each == path]
+        rows[mine] = np.arange(len(mine))
+        values.append(np.stack([source.moving[i].values for i in mine], axis=1) if mine else np.empty((0, 0, 0)))
+    return values, rows
 
 
 def _candidates(stored: Sequence[EncodedKeys], place: KeyInterval, *, rotations: bool) -> list[Candidate]:
