@@ -1,38 +1,38 @@
 // Links from nodes to their parents: bones, and those that only guide others, such as roots and controls of IK.
 
-import { Vector3 } from "three";
+import { Box3, Vector3 } from "three";
 
 const MAX_END_PER_RADIUS = 0.35; // length of a bone to a node without vertices, in radii of the model; longer to controls
 
 /**
- * Links [parent, child] between the nearest of the shown nodes: {bones, guides}. In a file with skins a bone begins below
- * a node that moves vertices, and ends at one that does, itself or by its children; or it is the short end of a chain.
+ * Links [parent, child] between the nearest of the shown nodes of a posed side: {bones, guides}. In a file with skins a
+ * bone begins below a node that moves vertices, and ends at one that does, itself or by its children; or it is the short
+ * end of a chain.
  */
-export function nodeLinks(side, nodes) {
-  const indices = new Set(nodes.map((node) => node.index));
-  const links = nodes.flatMap((node) => {
-    const parent = ancestors(side, node).find((each) => indices.has(each.index));
-    return parent ? [[parent, node]] : [];
-  });
-  const isSkinned = side.meshes.some((mesh) => mesh.isSkinnedMesh);
-  if (!isSkinned) return { bones: links, guides: [] };
+export function nodeLinks(side, shown) {
+  const links = nearestLinks(side, new Set(shown.map((node) => node.index)));
+  if (!side.meshes.some((mesh) => mesh.isSkinnedMesh)) return { bones: links, guides: [] };
   const moving = movingNodes(side);
-  const above = new Set([...moving].flatMap((index) => ancestors(side, side.nodes.get(index)).map((each) => each.index)));
-  const maxEnd = MAX_END_PER_RADIUS * radiusOf(nodes);
+  const [above, below] = [aboveNodes(side, moving), belowNodes(side, moving)];
+  const maxEnd = MAX_END_PER_RADIUS * radiusOf(shown);
   const isBone = ([parent, child]) => {
-    const isBelow = [parent, ...ancestors(side, parent)].some((each) => moving.has(each.index));
-    if (!isBelow) return false;
-    if (moving.has(child.index) || above.has(child.index)) return true;
-    return moving.has(parent.index) && distance(parent, child) <= maxEnd;
+    if (!below.has(parent.index)) return false;
+    if (above.has(child.index)) return true;
+    return moving.has(parent.index) && positionOf(parent).distanceTo(positionOf(child)) <= maxEnd;
   };
   return { bones: links.filter(isBone), guides: links.filter((link) => !isBone(link)) };
 }
 
-/** Parent, its parent and so on, of a node. */
-function ancestors(side, node) {
-  const found = [];
-  for (let each = side.nodes.get(node.parent); each; each = side.nodes.get(each.parent)) found.push(each);
-  return found;
+/** Links of shown nodes to the nearest shown one above each. Nodes of a side begin with the parents. */
+function nearestLinks({ nodes }, shown) {
+  const nearest = new Map([[null, null]]); // by parent: it, or what is shown above it
+  const links = [];
+  for (const node of nodes.values()) {
+    const parent = nearest.get(node.parent);
+    nearest.set(node.index, shown.has(node.index) ? node : parent);
+    if (parent && shown.has(node.index)) links.push([parent, node]);
+  }
+  return links;
 }
 
 /** Indices of nodes with meshes of their own, and of joints with weights. */
@@ -55,19 +55,26 @@ function weightedJoints({ skinIndex, skinWeight }) {
   return found;
 }
 
-function radiusOf(nodes) {
-  const place = new Vector3();
-  const low = new Vector3(Infinity, Infinity, Infinity);
-  const high = low.clone().negate();
-  for (const node of nodes) {
-    place.setFromMatrixPosition(node.object.matrixWorld);
-    low.min(place);
-    high.max(place);
+/** The nodes themselves and all above them. */
+function aboveNodes({ nodes }, indices) {
+  const found = new Set();
+  for (const index of indices) {
+    for (let each = nodes.get(index); each && !found.has(each.index); each = nodes.get(each.parent)) found.add(each.index);
   }
-  return high.distanceTo(low) / 2;
+  return found;
 }
 
-function distance(one, other) {
-  const [p, q] = [one, other].map((node) => new Vector3().setFromMatrixPosition(node.object.matrixWorld));
-  return p.distanceTo(q);
+/** The nodes themselves and all below them. */
+function belowNodes({ nodes }, indices) {
+  const found = new Set();
+  for (const { index, parent } of nodes.values()) if (indices.has(index) || found.has(parent)) found.add(index);
+  return found;
+}
+
+function radiusOf(nodes) {
+  return new Box3().setFromPoints(nodes.map(positionOf)).getSize(new Vector3()).length() / 2;
+}
+
+function positionOf(node) {
+  return new Vector3().setFromMatrixPosition(node.object.matrixWorld);
 }

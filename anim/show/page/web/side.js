@@ -24,7 +24,8 @@ export class Side {
     this.nodes = nodesOf(gltf);
     this.owners = ownersOf(this.nodes); // node index by mesh
     this.numHidden = hidden.length;
-    const isHidden = (mesh) => hidden.includes(this.owners.get(mesh));
+    const without = new Set(hidden);
+    const isHidden = (mesh) => without.has(this.owners.get(mesh));
     this.meshes = meshes.filter((mesh) => !isHidden(mesh));
     // Not by `visible`, which would hide the children of their nodes too
     for (const mesh of meshes.filter(isHidden)) mesh.layers.disableAll();
