@@ -22,10 +22,12 @@ _INHERITED = frozenset(
 
 
 def separate_meshes(json: Json) -> None:
-    """Give every node its own copy of a mesh with morph targets and several primitives, in place.
+    """Give nodes copies of meshes that three.js can't share, in place. Copies have the same accessors.
 
-    three.js animates the weights of the first node with such a mesh only. Copies have the same accessors.
+    It animates only the weights of the first node with a mesh of morph targets and several primitives, and fails on a
+    node without a skin if another node has the same mesh with one.
     """
+    _separate_skinned(json)
     meshes, used = json_array(json, "meshes"), set[int]()
     for node in json_array(json, "nodes"):
         mesh = node.get("mesh")
@@ -35,6 +37,20 @@ def separate_meshes(json: Json) -> None:
             meshes.append(dict(meshes[mesh]))
             node["mesh"] = len(meshes) - 1
         used.add(mesh)
+
+
+def _separate_skinned(json: Json) -> None:
+    """Give nodes without a skin a copy of a mesh that another node has with a skin, one for all of them."""
+    meshes, nodes = json_array(json, "meshes"), json_array(json, "nodes")
+    skinned = {node["mesh"] for node in nodes if "skin" in node and "mesh" in node}
+    copies: dict[int, int] = {}
+    for node in nodes:
+        mesh = node.get("mesh")
+        if mesh in skinned and "skin" not in node:
+            if mesh not in copies:
+                copies[mesh] = len(meshes)
+                meshes.append(dict(meshes[mesh]))
+            node["mesh"] = copies[mesh]
 
 
 def separate_names(json: Json) -> list[str]:

@@ -46,6 +46,17 @@ def _png(color: tuple[int, int, int] = (200, 30, 30)) -> bytes:
     return file.getvalue()
 
 
+def test_a_mesh_with_and_without_a_skin_becomes_two() -> None:
+    """three.js makes all nodes with it skinned, and fails on those without a skin."""
+    json = opened_fixture("biped").json
+    statues = [{"mesh": 0, "name": f"statue {i}"} for i in range(2)]
+    document = replace(opened_fixture("biped"), json={**json, "nodes": [*json["nodes"], *statues]})
+    embedded = opened(embed(document).glb).json
+    body, *others = (node["mesh"] for node in embedded["nodes"] if "mesh" in node)
+    assert others == [len(json["meshes"])] * 2
+    assert embedded["meshes"][others[0]]["primitives"] == embedded["meshes"][body]["primitives"]
+
+
 def _textured(*images: Json, textures: list[Json] | None = None, **more: Any) -> Document:
     """The biped with a material of a base color and a normal texture, of images 0 and the last."""
     document = opened_fixture("biped")
