@@ -45,12 +45,13 @@ def _separate_skinned(json: Json) -> None:
     skinned = {node["mesh"] for node in nodes if "skin" in node and "mesh" in node}
     copies: dict[int, int] = {}
     for node in nodes:
-        mesh = node.get("mesh")
-        if mesh in skinned and "skin" not in node:
-            if mesh not in copies:
-                copies[mesh] = len(meshes)
-                meshes.append(dict(meshes[mesh]))
-            node["mesh"] = copies[mesh]
+        if "skin" in node or node.get("mesh") not in skinned:
+            continue
+        mesh = node["mesh"]
+        if mesh not in copies:
+            copies[mesh] = len(meshes)
+            meshes.append(dict(meshes[mesh]))
+        node["mesh"] = copies[mesh]
 
 
 def separate_names(json: Json) -> list[str]:
