@@ -1,6 +1,6 @@
 """python -m tests.fuzz [FAMILY ...] [--count N] [--seed S] [--seconds T] [--keep FOLDER]: fuzz the commands.
 
-Families: gltf, euler, cache, springs, bodies, settings; all of them without any.
+Families: gltf, euler, cache, springs, bodies, settings, and rigs, whose outputs are judged; all of them without any.
 Runs mutations of fixtures until N of each family are done, or T seconds have passed; prints each new kind of fault,
 and keeps its input in FOLDER, as one JSON file. Such a file in tests/fuzz/found is a test from then on.
 """
@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from tests.fuzz.execution import BATCH, Job, Outcome, run_jobs
-from tests.fuzz.families import SEEDS, jobs, look, problems, sound_jobs
+from tests.fuzz.families import FAMILIES, jobs, look, problems, sound_jobs
 
 
 def main() -> int:
@@ -39,7 +39,7 @@ def main() -> int:
     done: Counter[str] = Counter()
     if given.replay:
         return replay(given.replay)
-    families = given.families or list(SEEDS)
+    families = given.families or list(FAMILIES)
     for family in families:
         warm(family)
     end = time.monotonic() + given.seconds

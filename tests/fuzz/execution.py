@@ -41,8 +41,8 @@ class Outcome:
     problems: list[str] = field(default_factory=list)
 
 
-# Command line, exit code, new files, stdout → problems of the outputs.
-Look = Callable[[Sequence[str], int, Sequence[str], bytes], list[str]]
+# Command line, exit code, new files, stdout, stderr → problems of the outputs.
+Look = Callable[[Sequence[str], int, Sequence[str], bytes, str], list[str]]
 
 
 def run_jobs(jobs: Sequence[Job], look: Look = lambda *_: []) -> Iterator[Outcome]:
@@ -105,7 +105,7 @@ def _one(job: Job, folder: Path, look: Look) -> Outcome:
     new = sorted(path.name for path in folder.iterdir() if path.name not in job.files)
     buffer = out.buffer
     assert isinstance(buffer, io.BytesIO)
-    return Outcome(code, err.getvalue(), seconds, peak, look(job.line, code, new, buffer.getvalue()))
+    return Outcome(code, err.getvalue(), seconds, peak, look(job.line, code, new, buffer.getvalue(), err.getvalue()))
 
 
 def _limit() -> None:

@@ -22,6 +22,8 @@ from cli import main
 from cli.io.cache_folders import CacheFolder
 from tests.fuzz.execution import CPU_LIMIT_S, Job, Outcome
 from tests.fuzz.mutations import mutate
+from tests.fuzz.rigs import judgement
+from tests.fuzz.rigs.judgement import judge, rig_job, warm_jobs
 from tests.fuzz.seed import Seed
 from tests.fuzz.settings_seeds import settings_seeds
 from tests.fuzz.simulation_seeds import body_seeds, spring_seeds
@@ -29,6 +31,7 @@ from tests.fuzz.simulation_seeds import body_seeds, spring_seeds
 MAX_LINE_LENGTH = 1100  # characters of stderr
 MAX_PEAK_BYTES = 1_000_000_000
 QUESTIONS = ("--", "the clip's end")  # an option has to say what the file leaves open, or does not suit it
+RIGS = "rigs"  # the family of sound files, whose outputs are judged
 SETTINGS = {"gltf-anim.toml", "pyproject.toml"}
 CODES = (0, 3, 4, 5, 6)  # 2 is for command lines, and those here are sound
 
@@ -75,6 +78,8 @@ def seeds(family: str) -> tuple[Seed, ...]:
 
 def jobs(family: str, seed: int, numbers: range) -> list[Job]:
     """Return the jobs of these numbers: always the same for a family and a seed."""
+    if family == RIGS:
+        return [rig_job(Random(f"{family} {seed} {number}")) for number in numbers]
     return [_job(family, Random(f"{family} {seed} {number}")) for number in numbers]
 
 
@@ -87,6 +92,8 @@ def _job(family: str, chosen: Random) -> Job:
 
 def sound_jobs(family: str) -> list[Job]:
     """Return a job for each command line on a sound file; they must succeed, and compile all kernels."""
+    if family == RIGS:
+        return warm_jobs()
     return [Job(_words(line, each.main), each.files) for each in seeds(family) for line in each.lines]
 
 
@@ -135,6 +142,9 @@ SEEDS: dict[str, Callable[[], Iterator[Seed]]] = {
 }
 
 
+FAMILIES = (*SEEDS, RIGS)
+
+
 def problems(job: Job, outcome: Outcome) -> list[str]:
     """Return the faults of an outcome: what no input may cause. Wrong settings are wrong usage."""
     found = list(outcome.problems)
@@ -152,9 +162,11 @@ def problems(job: Job, outcome: Outcome) -> list[str]:
     return found
 
 
-def look(line: Sequence[str], code: int, names: Sequence[str], out: bytes) -> list[str]:
+def look(line: Sequence[str], code: int, names: Sequence[str], out: bytes, err: str) -> list[str]:
     """Return the faults of the outputs in the current folder: a file of a failed run, or one that can't be read."""
     written = [name for name in names if not name.startswith("{")]
+    if judgement.NAME in line and code not in (0, 6):
+        return [f"a sound rig is refused with {code}"]
     if code not in (0, 6):
         several = line[0] == "run" or any("{clip}" in word for word in line)  # those before stay, and a note tells so
         return [f"{name} is left" for name in written if not several]
@@ -169,7 +181,7 @@ def look(line: Sequence[str], code: int, names: Sequence[str], out: bytes) -> li
             json.loads(out, parse_constant=_refuse)
         except ValueError as error:
             found.append(f"stdout is no JSON: {error}"[:200])
-    return found
+    return found + (judge(line, err, out) if judgement.NAME in line else [])
 
 
 def _refuse(name: str) -> float:

@@ -20,6 +20,7 @@ COUNTS = {  # mutations; 10 to 30 s each
     "springs": 800,
     "bodies": 800,
     "settings": 1600,
+    "rigs": 80,
 }
 SAMPLES = {  # sound inputs of some formats
     ".json": b'{"a": [1, {"b": 2.5}]}',
