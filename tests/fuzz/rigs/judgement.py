@@ -18,7 +18,6 @@ from tests.fuzz.rigs.rig import make_rig
 
 NAME = "rig.glb"
 MAX_ROUNDING = 3e-6  # of positions, of float32 along a chain, per largest coordinate
-MAX_TIME_ERROR = 2e-4  # of positions, where times are rounded to float32
 MAX_SAMPLED_FACTOR = 1.05  # of an error at any time, to the largest at samples
 STEP_TOLERANCE = 4e-6  # s per s: jumps within it are not compared
 MAX_TIMES = 400
@@ -120,7 +119,7 @@ def _judge_retime(line: Sequence[str], err: str, out: bytes, source: Evaluator) 
         rate, at_start = {"--speed": (2.5, start), "--reverse": (-1.0, end), "--offset": (1.0, start)}[line[3]]
         first = start + 0.75 if line[3] == "--offset" else start
         error = _largest_error(source, result, clip, rate=rate, first=first, original=at_start)
-        limit = MAX_TIME_ERROR * _size(source) * (1 + 2e6 * float(np.spacing(np.float32(end))))
+        limit = 10 * MAX_ROUNDING * _size(source) + 2 * _time_rounding(source, clip)
         faults += [f"clip {clip}: error {error:.4g} m"] * (error > limit)
     return faults
 
@@ -213,6 +212,16 @@ def _largest_error(
     after = result.vertices(clip, times, nlerp=nlerp)
     assert before.keys() == after.keys()
     return max(float(np.linalg.norm(after[i] - before[i], axis=2).max()) for i in before)
+
+
+def _time_rounding(source: Evaluator, clip: int) -> float:
+    """Largest motion of a vertex within the rounding of times to float32."""
+    start, end = source.key_times(clip)[[0, -1]]
+    times = np.linspace(start, end, MAX_TIMES)
+    times = times[_apart_from_steps(source, clip, times)]
+    spacing = float(np.spacing(np.float32(end)))
+    early, late = (source.vertices(clip, times + shift) for shift in (-spacing, spacing))
+    return max(float(np.linalg.norm(late[i] - early[i], axis=2).max(initial=0.0)) for i in early)
 
 
 def _apart_from_steps(file: Evaluator, clip: int, times: Array) -> NDArray[np.bool_]:
