@@ -11,6 +11,7 @@ ERROR_FRACTIONS = tuple(
 )  # of the diagonal: 1e-5 to 1e-2, two a decade
 MIN_BOUND_PER_DIAGONAL, MAX_BOUND_PER_DIAGONAL = 1e-6, 0.1  # range of the search
 TABLE_FRACTIONS = tuple(10.0 ** (k / 4 - 6) for k in range(21))  # of the diagonal: that range, four a decade
+TABLE_FACTOR = TABLE_FRACTIONS[1] / TABLE_FRACTIONS[0]
 FIRST_ENTRY, FIRST_STEP = 12, 4  # of the table: 1e-3 of the diagonal, and its neighbors a decade apart
 SIZE_MARGIN = 3e-3  # of the animation's bytes: sizes between two entries are estimates
 BOUND_STEP_FACTOR = 1.05  # between the bounds that a search may return
@@ -73,6 +74,12 @@ def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) 
     excess = min(point.animation / animation, 2.0)
     factor = min(max(excess**BOUND_EXPONENT_PER_SIZE, BOUND_STEP_FACTOR), MAX_STEP_FACTOR)
     return _rounded(max(bound, MIN_BOUND_PER_DIAGONAL * diagonal) * factor, diagonal)
+
+
+def bound_between(low: float, high: float, diagonal: float) -> float | None:
+    """Return a bound, m, between two of which the lower one is taken for too small; None if they are too near."""
+    middle = _rounded(math.sqrt(low * high), diagonal) if low else high
+    return middle if middle < high / math.sqrt(BOUND_STEP_FACTOR) else None
 
 
 class _SizeTable:

@@ -7,7 +7,14 @@ from dataclasses import replace
 
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Request
-from anim.optimization.rate_distortion import MAX_BOUND_PER_DIAGONAL, RatePoint, next_bound, smallest_bound
+from anim.optimization.rate_distortion import (
+    MAX_BOUND_PER_DIAGONAL,
+    TABLE_FACTOR,
+    RatePoint,
+    bound_between,
+    next_bound,
+    smallest_bound,
+)
 from anim.units import format_number, plural
 from cli.errors import CheckError
 from cli.reports import optimize_report
@@ -17,7 +24,9 @@ from cli.workflows.optimize_job import OptimizeJob, with_bound
 FAST = "fast"  # effort of sizes that are tried
 USUAL_RATIO = 0.985  # bytes of animation after a longer search, as a fraction of those after a fast one
 SAMPLED_CLIPS = 4  # one clip of so many measures that ratio
-MAX_FULL_SEARCHES = 4
+MAX_FULL_SEARCHES = 4  # until a result fits
+MAX_UNUSED_FRACTION = 0.015  # of the animation's bytes; more are worth another search
+MAX_REFINEMENTS = 3
 
 
 class ByteLimit:
@@ -51,13 +60,33 @@ class ByteLimit:
             found = job.run(with_bound(request, bound))
             point = job.point(bound, found)
             if point.size <= self._max_bytes:
-                return with_bound(request, bound), found
+                return self._with_less_error(request, found, point)
             if bound >= most:
                 break
             bound = min(next_bound(bound, job.scale, point, self._max_bytes), most)
         found = job.run(replace(with_bound(request, most), effort=FAST))  # no longer search fits
         self._check_fit(job.point(most, found))
         return with_bound(request, most), found
+
+    def _with_less_error(self, request: Request, found: Optimized, point: RatePoint) -> tuple[Request, Optimized]:
+        """The request and the result with a smaller bound, if many bytes are unused, as with jumps in a file's sizes.
+
+        found, point: a result that fits.
+        """
+        low, diagonal = point.max_error / TABLE_FACTOR, self._job.scale
+        for _ in range(MAX_REFINEMENTS):
+            if self._max_bytes - point.size <= MAX_UNUSED_FRACTION * point.animation:
+                break
+            bound = bound_between(low, point.max_error, diagonal)
+            if bound is None:
+                break
+            other = self._job.run(with_bound(request, bound))
+            sized = self._job.point(bound, other)
+            if sized.size <= self._max_bytes:
+                found, point = other, sized
+            else:
+                low = bound
+        return with_bound(request, point.max_error), found
 
     def _estimate(self, request: Request, max_error: float) -> RatePoint:
         """The size at a bound, in m, by a fast search without verification."""

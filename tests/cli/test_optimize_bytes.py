@@ -11,6 +11,7 @@ import pytest
 from anim.gltf.io import container
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Effort, Request
+from cli.workflows import byte_limit
 from cli.workflows.optimize_job import OptimizeJob
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
@@ -68,6 +69,20 @@ def test_one_full_search_with_verification(
     assert sum(each[0] == "balanced" for each in runs) <= 3
     assert all(count <= -(-clips // 4) for effort, verified, count in runs if effort == "balanced" and not verified)
     assert len(runs) <= 9
+
+
+def test_unused_bytes_are_worth_another_search(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where sizes jump, the first bound that fits can be far from the smallest."""
+    errors = []
+    for searches in (0, 3):
+        monkeypatch.setattr(byte_limit, "MAX_REFINEMENTS", searches)
+        output = tmp_path / f"{searches}.glb"
+        run = call("optimize", fixture("noop"), output, "--max-bytes", "5600", "--report", "-", *FAST)
+        assert output.stat().st_size <= 5600
+        errors.append(max(each["max_error_m"] for each in run.json["clips"]))
+    assert errors[1] <= errors[0]
 
 
 def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:

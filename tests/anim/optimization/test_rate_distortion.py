@@ -14,6 +14,7 @@ from anim.optimization.rate_distortion import (
     MAX_BOUND_PER_DIAGONAL,
     MIN_BOUND_PER_DIAGONAL,
     RatePoint,
+    bound_between,
     curve,
     next_bound,
     smallest_bound,
@@ -126,3 +127,12 @@ def test_the_next_bound_follows_from_the_bytes_too_many() -> None:
     assert 1.04 * bound < near < far < 1.6 * bound
     assert next_bound(bound, DIAGONAL, RatePoint(bound, 9000, bound, 1500), 2000) < 4.3 * bound
     assert next_bound(0.0, DIAGONAL, RatePoint(0.0, 2001, 0.0, 1500), 2000) > 0
+
+
+def test_bounds_between_two_come_to_an_end() -> None:
+    low, high, tried = 1e-3 * DIAGONAL, 1.8e-3 * DIAGONAL, 0
+    while (bound := bound_between(low, high, DIAGONAL)) is not None:
+        assert low < bound < high
+        high, tried = bound, tried + 1
+    assert 2 <= tried <= 5
+    assert bound_between(0.0, high, DIAGONAL) is None
