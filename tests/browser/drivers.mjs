@@ -24,7 +24,10 @@ const FIREFOX_PREFERENCES = {
   "ui.prefersReducedMotion": 1, // pages begin paused
 };
 // Codes of keys in WebDriver
-const CODES = { ArrowLeft: "\uE012", ArrowRight: "\uE014", Home: "\uE011", End: "\uE010", Escape: "\uE00C", Shift: "\uE008" };
+const CODES = {
+  ArrowLeft: "\uE012", ArrowRight: "\uE014", Home: "\uE011", End: "\uE010", PageUp: "\uE00E", PageDown: "\uE00F",
+  Escape: "\uE00C", Shift: "\uE008",
+};
 const DRIVER_START_MS = 20000;
 
 export function launch(engine, found) {

@@ -18,6 +18,7 @@ const PIN = `(() => {
   const [x, y] = document.querySelector("#pin").style.transform.match(/-?[\\d.]+/g).map(Number);
   return !spot || Math.hypot(spot.x - x, spot.y - y) < 1;
 })()`;
+const DIRECTION = "player.stage.camera.position.clone().sub(player.stage.controls.target)";
 // Canvases of curves and scrubber begin and end at the same pixels
 const AXES = `(() => {
   const [one, other] = ["#curves canvas", "#scrub canvas"].map((each) => document.querySelector(each).getBoundingClientRect());
@@ -177,7 +178,16 @@ async function tryDesktop(file, faults) {
   }
   await press("d");
   expect((await get("document.documentElement.dataset.theme")) === "dark", "dark");
+  for (const [key, axis] of [["1", 2], ["3", 0], ["7", 1]]) {
+    await press(key);
+    expect(await get(`${DIRECTION}.normalize().toArray()[${axis}] > 0.999`), `${key} looks along axis ${axis}`);
+  }
+  const distance = await get(`${DIRECTION}.length()`);
+  await press("PageUp");
+  expect((await get(`${DIRECTION}.length()`)) < 0.9 * distance, "nearer");
+  await press("PageDown");
   await press("f");
+  expect(!(await get("player.stage.cameraText")), "F frames everything");
   await press("?");
   expect((await get(`document.querySelectorAll("dialog[open] kbd").length`)) > 18, "sheet of keys");
   await press("Escape");
@@ -198,6 +208,10 @@ async function tryDesktop(file, faults) {
     for (const side of ["a", "b", "over", "both"]) {
       await press("b");
       expect((await get("player.state.side")) === side, `side ${side}`);
+    }
+    for (const side of ["over", "both"]) {
+      await press("v");
+      expect((await get("player.state.side")) === side, `v: side ${side}`);
     }
     expect(await get(PIN), "the ring is on the worst vertex");
     expect(await get(EQUAL), "names the parents of a node with equal curves");

@@ -1,5 +1,6 @@
 // What the keys do.
 
+import { lookFrom, zoomTo } from "./camera.js";
 import { nextClip } from "./clips.js";
 import { facts, hasNodes } from "./data.js";
 import { $ } from "./dom.js";
@@ -8,6 +9,7 @@ import { focusFilter } from "./sidebar.js";
 import { LOOPS, SIDES, SPEEDS, UNITS, cycle, state, toggleShow, update } from "./state.js";
 
 const STEP_S = 1 / 30;
+const ZOOM = 1.25; // of the camera's distance, by a key
 
 /** All keys, in the order of the sheet. */
 export function bindings(player) {
@@ -36,6 +38,16 @@ export function bindings(player) {
     { keys: ["-", "+"], label: "slower, faster", run: (event) => changeSpeed(event.key === "-" ? -1 : 1) },
     { keys: ["l"], label: "loop, once, ping-pong", run: () => cycle("loop", LOOPS) },
     { keys: ["f"], label: "frame the chosen node; again: everything", run: () => frame(player) },
+    {
+      keys: ["1", "3", "7"],
+      label: "from the front, the side, above",
+      run: ({ key }) => lookFrom(player.stage, { 1: "front", 3: "side", 7: "above" }[key]),
+    },
+    {
+      keys: ["PageUp", "PageDown"],
+      label: "nearer, farther",
+      run: ({ key }) => zoomTo(player.stage, key === "PageUp" ? 1 / ZOOM : ZOOM, 0, 0),
+    },
     { keys: ["s"], label: "skeleton", run: () => toggleShow("bones"), isShown },
     { keys: ["w"], label: "wireframe", run: () => toggleShow("wire") },
     { keys: ["o"], label: "onion skins", run: () => toggleShow("onion") },

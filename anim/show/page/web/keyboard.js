@@ -11,6 +11,7 @@ export function listenToKeys(bindings) {
     if (tag === "SELECT" || (tag === "INPUT" && event.target.type === "search")) return;
     if (event.key === " " && tag === "BUTTON" && event.target.id !== "play") return;
     if (event.key === " " && tag === "SUMMARY") return;
+    if (event.key.startsWith("Page") && event.target.closest("#side")) return; // lists scroll
     const binding = byKey.get(event.key.length === 1 ? event.key.toLowerCase() : event.key);
     if (!binding || binding.isShown === false) return;
     event.preventDefault();
@@ -31,7 +32,7 @@ function releaseFocus(event) {
   if (event.detail > 0) event.target.closest("button, summary")?.blur();
 }
 
-const LABELS = { " ": "space", ArrowLeft: "←", ArrowRight: "→", Home: "Home", End: "End" };
+const LABELS = { " ": "space", ArrowLeft: "←", ArrowRight: "→", Home: "Home", End: "End", PageUp: "PgUp", PageDown: "PgDn" };
 
 export function openSheet() {
   $("#keys").showModal();

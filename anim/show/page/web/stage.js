@@ -5,7 +5,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { formatLength, roundDown } from "./format.js";
 import { Ghost } from "./ghost.js";
 import { state } from "./state.js";
-import { listenToWheel, zoomTo } from "./zoom.js";
+import { listenToWheel, zoomTo } from "./camera.js";
 
 const FIT_TIMES = 5; // of the clip
 const MAX_FIT_VERTICES = 400; // per mesh and time

@@ -1,10 +1,12 @@
-// Zoom to the cursor: what is below it stays there. OrbitControls takes the whole canvas for one view; here are up to two.
+// The camera by wheel and keys. What is below the cursor stays there: OrbitControls would take the whole canvas for one
+// view, and here are up to two.
 
 import { Vector3 } from "three";
 
 const SCALE_PER_PX = 1.0005; // of the camera's distance; up is nearer
 const MODE_PX = [1, 16, 100]; // of wheel events in pixels, lines and pages
 const PINCH = 10; // pinches of a trackpad come as wheel events with Ctrl and small steps
+const DIRECTIONS = { front: [0, 0, 1], side: [1, 0, 0], above: [0, 1, 1e-4] };
 
 /** Zoom by the wheel in place of OrbitControls; it must be called before they listen. Fingers are left to them. */
 export function listenToWheel(canvas, zoom) {
@@ -25,9 +27,17 @@ export function zoomTo({ camera, controls }, scale, x, y) {
   const { target, minDistance, maxDistance } = controls;
   const distance = camera.position.distanceTo(target);
   const allowed = Math.max(minDistance, Math.min(distance * scale, maxDistance)) / distance;
+  camera.updateMatrixWorld(); // of several events before a picture
   const ray = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position);
   const ahead = target.clone().sub(camera.position);
   const point = ray.multiplyScalar(ahead.lengthSq() / ray.dot(ahead)).add(camera.position);
   for (const each of [camera.position, target]) each.sub(point).multiplyScalar(allowed).add(point);
+  controls.update();
+}
+
+/** Look at the target from the "front", the "side" or "above", at the present distance. */
+export function lookFrom({ camera, controls }, name) {
+  const distance = camera.position.distanceTo(controls.target);
+  camera.position.set(...DIRECTIONS[name]).setLength(distance).add(controls.target);
   controls.update();
 }
