@@ -106,6 +106,7 @@ def analyze_source(
     points = _on_moving_nodes(points, skeleton, matrices, levels, nodes)
     levels = required_levels(skeleton, points.nodes)
     columns = stack_points(world, points.nodes)
+    del matrices, world  # large for long clips
     by_chord = columns
     if any(
         each.path == "rotation" and each.meters * _max_chord_error(clip.tracks[each.index]) > chord_tolerance
@@ -150,10 +151,13 @@ def _spline_times(axis: Floats) -> Floats:
 
 def _local(poses: PoseSampler, at: Floats) -> tuple[Floats, Floats, Floats]:
     shown = poses.at(at)
-    rotation = quaternion.align_signs(shown.rotation)
-    parts = (np.ascontiguousarray(np.swapaxes(part, 0, 1)) for part in (shown.translation, rotation, shown.scale))
-    translation, rotation, scale = parts
-    return translation, rotation, scale
+    rotation = _by_node(quaternion.align_signs(shown.rotation))
+    return _by_node(shown.translation), rotation, _by_node(shown.scale)
+
+
+def _by_node(values: Floats) -> Floats:
+    """Values (N, W, C) from (W, N, C)."""
+    return np.ascontiguousarray(np.swapaxes(values, 0, 1))
 
 
 def _nlerp_local(poses: PoseSampler, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:

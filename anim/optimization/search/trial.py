@@ -28,6 +28,8 @@ CONSTANT_BUDGET_FACTOR = 1.5  # times a track's budget: tolerance for dropping i
 QUANTIZATION_BUDGET_FRACTION = 0.5  # of a budget
 CHORD_BOUND_FRACTION = 0.02  # of the bound; if slerp and nlerp are closer, only slerp is measured
 MIN_INTERVAL_S = 1e-4  # s; minimum time step of a speed
+MAX_BLOCK_MATRICES = 500_000  # world matrices of nodes at a time: 48 MB; more are measured in blocks of times
+MIN_BLOCK_TIMES = 64
 
 
 class TrialRunner:
@@ -207,7 +209,8 @@ class BoundUsage:
         self._source = source
         self._rows = source.points.rows()
         self._allowed = allowed
-        self._local = local_matrices(skeleton, source.local)
+        self._blocks = _time_blocks(len(source.at), len(skeleton))
+        self._local = local_matrices(skeleton, source.local) if len(self._blocks) == 1 else None
         self._changing = np.array(sorted({each.node for each in source.moving}), np.int64)
         self._nodes = np.array([each.node for each in source.moving], np.int64)
         self._turning = np.array([each.path == "rotation" for each in source.moving], np.bool_)
@@ -235,19 +238,38 @@ class BoundUsage:
         return own
 
     def _usage(self, shown: Sequence[Floats], columns: Floats) -> Floats:
-        moved = self._rows.moves(stack_points(self._world(shown), self._source.points.nodes) - columns)
+        found = [self._usage_over(times, shown, columns) for times in self._blocks]
+        return found[0] if len(found) == 1 else np.asarray(np.max(found, axis=0))
+
+    def _usage_over(self, times: slice, shown: Sequence[Floats], columns: Floats) -> Floats:
+        """The bound usage at some of the measurement times."""
+        at = self._source.at[times]
+        some = columns.reshape(len(columns), 3, -1)[..., times].reshape(len(columns), -1)
+        world = self._world([part[:, times] for part in shown], times)
+        moved = self._rows.moves(stack_points(world, self._source.points.nodes) - some)
         usage = _longest(moved) / self._allowed
-        if self.bounds.max_speed_error is not None and len(self._source.at) > 1:
-            gaps = np.maximum(np.diff(self._source.at), MIN_INTERVAL_S).astype(np.float32)
+        if self.bounds.max_speed_error is not None and len(at) > 1:
+            gaps = np.maximum(np.diff(at), MIN_INTERVAL_S).astype(np.float32)
             usage = np.maximum(usage, _longest(np.diff(moved, axis=2) / gaps) / self.bounds.max_speed_error)
         return np.asarray(usage, np.float64)
 
-    def _world(self, shown: Sequence[Floats]) -> Floats:
+    def _world(self, shown: Sequence[Floats], times: slice) -> Floats:
         """World matrices (N, W, 3, 4); only nodes that a track may change get new local matrices."""
-        local = self._local.copy(order="K")
+        if self._local is None:
+            local = local_matrices(self._skeleton, [part[:, times] for part in self._source.local])
+        else:
+            local = self._local.copy(order="K")
         changing = self._changing
         local[changing] = matrix.from_trs(*(part[changing] for part in shown))
         return matrix.accumulate_world(local, self._skeleton.parents, list(self._source.levels))
+
+
+def _time_blocks(times: int, nodes: int) -> list[slice]:
+    """Slices of the measurement times, each with one time of the block before, from which speeds are measured."""
+    length = max(MAX_BLOCK_MATRICES // max(nodes, 1), MIN_BLOCK_TIMES)
+    if times <= length:
+        return [slice(None)]
+    return [slice(max(first - 1, 0), first + length) for first in range(0, times, length)]
 
 
 def _longest(moved: Floats) -> Floats:

@@ -7,6 +7,7 @@ import pytest
 
 from anim.arrays import Floats
 from anim.optimization.options import Bounds
+from anim.optimization.search import trial
 from anim.optimization.search.playback import level_world_matrices
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.search.trial import MIN_INTERVAL_S, BoundUsage
@@ -53,6 +54,21 @@ def test_speeds_count_where_they_are_bounded() -> None:
     expected = np.maximum(np.linalg.norm(moves, axis=2).max(axis=1) / ALLOWED, speeds.max(axis=1) / 0.3)
     usage = BoundUsage(OF.skeleton, source, ALLOWED, Bounds(0.1, 0.0, max_speed_error=0.3))
     assert usage.slerp_raw(shown) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("length", [1, 2, 7])
+def test_blocks_of_times_give_the_same(length: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long clips are measured block by block, so that memory does not follow their length; speeds cross its ends."""
+    source = truth_of(OF, waving(), POINTS)
+    shown = _changed(source)
+    bounds = Bounds(0.1, 0.0, max_speed_error=0.3)
+    whole = BoundUsage(OF.skeleton, source, ALLOWED, bounds)
+    monkeypatch.setattr(trial, "MAX_BLOCK_MATRICES", length * len(OF.skeleton))
+    monkeypatch.setattr(trial, "MIN_BLOCK_TIMES", 1)
+    blocks = BoundUsage(OF.skeleton, source, ALLOWED, bounds)
+    assert len(trial._time_blocks(len(source.at), len(OF.skeleton))) == -(-len(source.at) // length) > 1
+    assert blocks.slerp_raw(shown) == pytest.approx(whole.slerp_raw(shown), rel=1e-4)
+    assert blocks.nlerp(shown) == pytest.approx(whole.nlerp(shown), rel=1e-4)
 
 
 def test_without_a_bound_on_angles_tracks_have_no_strain_of_their_own() -> None:
