@@ -88,28 +88,52 @@ def scale_fractions(rig: SkinBinding) -> FloatArray:
     places = np.where(there, rig.start[:-1, None] + np.arange(rig.max_count), 0)
     joint = np.where(there, rig.joint[places] if len(rig.joint) else 0, 0)
     weight = np.where(there, rig.weight[places] if len(rig.joint) else 0, 0).astype(np.float64)
-    fractions, above = np.zeros(weight.shape), is_ancestor(rig.ancestors)
+    fractions = np.zeros(weight.shape)
+    first, end = (each[joint] for each in find_subtrees(rig.ancestors))
     for i in range(rig.max_count):
         for k in range(i + 1, rig.max_count):
-            first = 0.5 + (above[joint[:, i], joint[:, k]] - above[joint[:, k], joint[:, i]]) / 2
+            is_upper = (first[:, i] < first[:, k]) & (first[:, k] < end[:, i])
+            is_lower = (first[:, k] < first[:, i]) & (first[:, i] < end[:, k])
+            part = 0.5 + (is_upper.astype(np.float64) - is_lower) / 2
             amount = weight[:, i] * weight[:, k]
-            fractions[:, i] += amount * first
-            fractions[:, k] += amount * (1 - first)
+            fractions[:, i] += amount * part
+            fractions[:, k] += amount * (1 - part)
     alone = fractions.sum(axis=1) == 0
     fractions[alone] = np.arange(rig.max_count) == 0
     fractions /= np.maximum(fractions.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     return fractions[there].astype(np.float32)
 
 
-def is_ancestor(above: Ints) -> Floats:
-    """Return 1 if joint j is a descendant of joint i (J, J), else 0. above: (J,), as in a rig.
+def find_subtrees(above: Ints) -> tuple[Ints, Ints]:
+    """Return the first position (J,) of each joint's subtree in depth-first order, and the one after its last.
 
-    is_ancestor([-1, 0]) → [[0, 1], [0, 0]]
+    Joint j is below joint i if first[i] < first[j] < end[i]. above: (J,), as in a rig.
+    find_subtrees([-1, 0]) → [0, 1], [2, 2]
     """
-    found = np.zeros((len(above), len(above)))
-    for j in range(len(above)):
-        at = int(above[j])
-        while at >= 0:
-            found[at, j] = 1
-            at = int(above[at])
-    return found
+    order = _depth_first(above)
+    first = np.empty(len(above), np.int64)
+    first[order] = np.arange(len(order))
+    return first, first + subtree_sums(above, np.ones(len(above))).astype(np.int64)
+
+
+def subtree_sums(above: Ints, values: Floats) -> Floats:
+    """Return the sum (J,) of each joint's value and those of all joints below it. above: (J,), as in a rig."""
+    total, parents = values.tolist(), above.tolist()
+    for joint in reversed(_depth_first(above)):
+        if parents[joint] >= 0:
+            total[parents[joint]] += total[joint]
+    return np.array(total, np.float64)
+
+
+def _depth_first(above: Ints) -> list[int]:
+    """All joints, parents before those below them."""
+    children: list[list[int]] = [[] for _ in above]
+    waiting: list[int] = []
+    for joint, parent in enumerate(above.tolist()):
+        (children[parent] if parent >= 0 else waiting).append(joint)
+    waiting.reverse()
+    order = []
+    while waiting:
+        order.append(waiting.pop())
+        waiting += reversed(children[order[-1]])
+    return order

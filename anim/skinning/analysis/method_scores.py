@@ -16,7 +16,7 @@ from anim.skinning.bake import Baker
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh
 from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, clamp_positions
-from anim.skinning.weighted_joints import is_ancestor
+from anim.skinning.weighted_joints import subtree_sums
 
 BULGE_RATIO = 1.05  # distance from the bones relative to bind pose, above which a vertex bulges
 MIN_DISTANCE_FRACTION = 0.25  # of the median distance: nearer vertices have no meaningful ratio
@@ -153,7 +153,7 @@ def _common_volume(rig: SkinBinding, matrices: Floats) -> Floats:
     acts on them. A few joints that grow or shrink don't count.
     """
     own = np.bincount(rig.joint, rig.weight, minlength=len(rig.nodes))
-    weight = np.where(own > 0, own + is_ancestor(rig.ancestors) @ own, 0)
+    weight = np.where(own > 0, subtree_sums(rig.ancestors, np.asarray(own, np.float64)), 0)
     sizes = np.linalg.det(matrices[..., :3])
     order = np.argsort(sizes, axis=1)
     middle = (np.cumsum(weight[order], axis=1) >= weight.sum() / 2).argmax(axis=1)
