@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats, Ints
-from anim.maths import hierarchy
+from anim.maths import euler, hierarchy
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.loops import loop_analysis
@@ -223,6 +223,15 @@ def test_a_bvh_of_a_long_chain_is_as_long_as_the_chain(call: Call, tmp_path: Pat
     assert sizes[1] < 2.1 * sizes[0]
     call("from-euler", tmp_path / "out.bvh", tmp_path / "again.glb").product()
     assert len(opened_path(tmp_path / "again.glb").json["nodes"]) == 601  # with its end site
+
+
+def test_a_bvh_computes_angles_of_many_nodes_at_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = _count_calls(monkeypatch, euler, "unwrap")
+    (tmp_path / "in.glb").write_bytes(many.side_moving(500))
+    call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh", "--clip", "#0").product()
+    assert 0 < len(counted) < 5
 
 
 def test_static_nodes_are_measured_as_one(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

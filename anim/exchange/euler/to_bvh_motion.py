@@ -28,6 +28,7 @@ MAX_FRAMES = 10_000_000
 TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
 NOTED_ERROR_DEG = 1.0  # degrees, of rotations between frames
 CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
+BLOCK_VALUES = 1 << 17  # nodes × frames computed at a time
 BRACES = "{}"
 END_NAME_SUFFIX = "_end"  # a static leaf of this name marks the end of its parent
 
@@ -57,7 +58,7 @@ def to_bvh(
     orders.check([names[node] for node in chosen])
     shown, times = _frames(clip, fps)
     figure = _Skeleton(skeleton, clip, chosen, times)
-    nodes = [_node(figure, node, names[node], orders, shown, meters_per_unit) for node in chosen]
+    nodes = _nodes(figure, [names[node] for node in chosen], orders, shown, meters_per_unit)
     notes = (
         skipped_note(_unsupported_tracks(skeleton, clip, chosen))
         + _rename_nodes(skeleton, names, chosen)
@@ -67,59 +68,79 @@ def to_bvh(
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 
-JointTransform = tuple[
-    Floats, Floats, Floats
-]  # rest position (3,), rotation from rest (F, 4), positions (F, 3), in world space
-
-
 class _Skeleton:
-    """The nodes to write, in their order, with world positions at rest and at times (F,)."""
+    """The nodes to write, in their order, with world positions at rest and at times (F,).
+
+    parents: (N,) index among them of the nearest one above each, −1 for the world, whose frame is the last one of all.
+    """
 
     def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
         moving, still = sample_pose(skeleton, clip, times), rest_pose(skeleton)
-        self.skeleton, self.clip = skeleton, clip
-        self.numbers = {node: i for i, node in enumerate(chosen)}
-        self.above = nearest_ancestors(skeleton, self.numbers)
-        self.ends = _ends(skeleton, clip, self.numbers)
-        self._places, self._home = world_matrices(skeleton, moving)[..., 3], world_matrices(skeleton, still)[0, :, :, 3]
-        turned, unturned = world_rotations(skeleton, moving.rotation), world_rotations(skeleton, still.rotation)
-        self._turns = {n: quaternion.multiply(turned[n], quaternion.conjugate(unturned[n])) for n in chosen}
-        self.size = float(np.ptp(self._home[chosen], axis=0).max()) or 1.0
+        numbers = {node: i for i, node in enumerate(chosen)}
+        above = nearest_ancestors(skeleton, numbers)
+        ends = _ends(skeleton, clip, numbers)
+        self.parents = np.array([numbers.get(above[node], -1) for node in chosen])
+        self.is_end = np.array([node in ends for node in chosen])
+        self._home = _with_world(world_matrices(skeleton, still)[..., 3][0, chosen], ZERO)
+        self._places = _with_world(world_matrices(skeleton, moving)[..., 3][:, chosen], ZERO)
+        turned, unturned = (world_rotations(skeleton, pose.rotation) for pose in (moving, still))
+        back = quaternion.conjugate(np.stack([unturned[n] for n in chosen], axis=1))
+        self._turns = _with_world(quaternion.multiply(np.stack([turned[n] for n in chosen], axis=1), back), IDENTITY)
+        self.size = float(np.ptp(self._home[:-1], axis=0).max()) or 1.0
 
-    def placed(self, node: int) -> JointTransform:
-        """World position and rotation of a node; −1 is the world itself."""
-        if node < 0:
-            return ZERO, IDENTITY[None], ZERO
-        return self._home[node], self._turns[node], self._places[:, node]
-
-
-def _node(
-    figure: _Skeleton, node: int, name: str, orders: OrderRules, shown: Floats, meters_per_unit: float
-) -> EulerNode:
-    """A joint with its required curves; lengths in the file's unit, keys at times `shown`."""
-    parent = figure.above[node]
-    offset, turn, path = _relative_to(figure.placed(node), figure.placed(parent))
-    moved = parent < 0 or bool(np.abs(path - offset).max() > CONSTANT_TOLERANCE * figure.size)
-    end = parent >= 0 and not moved and node in figure.ends
-    order = orders.of(name, turn)
-    angles = euler.unwrap(turn, order=order, frame=AxesConvention.INTRINSIC, lock=LOCK_TOLERANCE_RAD)
-    return EulerNode(
-        name,
-        figure.numbers.get(parent, -1),
-        offset / meters_per_unit,
-        order,
-        AxesConvention.INTRINSIC,
-        np.zeros(3),
-        (None, None, None) if end else tuple(_curves(shown, angles)),
-        dict(enumerate(_curves(shown, path / meters_per_unit))) if moved else {},
-        end=end,
-    )
+    def relative(self, some: slice) -> tuple[Floats, Floats, Floats]:
+        """Nodes relative to their parents: offset at rest (n, 3), rotation from rest (F, n, 4), offset (F, n, 3)."""
+        above = self.parents[some]
+        back = quaternion.conjugate(self._turns[:, above])
+        path = quaternion.rotate(back, self._places[:, :-1][:, some] - self._places[:, above])
+        turn = quaternion.multiply(back, self._turns[:, :-1][:, some])
+        return self._home[:-1][some] - self._home[above], turn, path
 
 
-def _relative_to(node: JointTransform, parent: JointTransform) -> JointTransform:
-    """The joint relative to its parent: offset at rest, rotation, and offset at all times."""
-    back = quaternion.conjugate(parent[1])
-    return node[0] - parent[0], quaternion.multiply(back, node[1]), quaternion.rotate(back, node[2] - parent[2])
+def _with_world(values: Floats, own: Floats) -> Floats:
+    """Values (..., N, C) and after them those of the world."""
+    last = np.broadcast_to(own, (*values.shape[:-2], 1, values.shape[-1]))
+    return np.concatenate((values, last), axis=-2)
+
+
+def _nodes(
+    figure: _Skeleton, names: Sequence[str], orders: OrderRules, shown: Floats, meters_per_unit: float
+) -> list[EulerNode]:
+    """Joints with their required curves; lengths in the file's unit, keys at times `shown`."""
+    axis, size = TimeAxis(shown), max(1, BLOCK_VALUES // len(shown))
+    made = []
+    for first in range(0, len(names), size):
+        some = slice(first, first + size)
+        offset, turn, path = figure.relative(some)
+        parents = figure.parents[some]
+        moved = (parents < 0) | (np.abs(path - offset).max(axis=(0, 2)) > CONSTANT_TOLERANCE * figure.size)
+        end = (parents >= 0) & ~moved & figure.is_end[some]
+        chosen = [orders.of(name, turn[:, i]) for i, name in enumerate(names[some])]
+        angles = _angles(turn, chosen)
+        for i, name in enumerate(names[some]):
+            made.append(
+                EulerNode(
+                    name,
+                    int(parents[i]),
+                    offset[i] / meters_per_unit,
+                    chosen[i],
+                    AxesConvention.INTRINSIC,
+                    np.zeros(3),
+                    (None, None, None) if end[i] else tuple(_curves(axis, angles[:, i])),
+                    dict(enumerate(_curves(axis, path[:, i] / meters_per_unit))) if moved[i] else {},
+                    end=bool(end[i]),
+                )
+            )
+    return made
+
+
+def _angles(turn: Floats, orders: Sequence[str]) -> Floats:
+    """Continuous angles (F, n, 3) of rotations (F, n, 4), each node by its order."""
+    found = np.empty((*turn.shape[:-1], 3))
+    for order in set(orders):
+        own = np.array([each == order for each in orders])
+        found[:, own] = euler.unwrap(turn[:, own], order=order, frame=AxesConvention.INTRINSIC, lock=LOCK_TOLERANCE_RAD)
+    return found
 
 
 def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
@@ -199,6 +220,5 @@ def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int])
     ]
 
 
-def _curves(times: Floats, values: Floats) -> list[Curve]:
-    axis = TimeAxis(times)
+def _curves(axis: TimeAxis, values: Floats) -> list[Curve]:
     return [linear(axis, column) for column in values.T]

@@ -6,9 +6,10 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import UnsupportedError
-from anim.exchange.euler.curve import evaluate
+from anim.exchange.euler.curve import Curve, evaluate
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths.euler import AxesConvention
+from anim.model import TimeAxis
 
 MAX_INDENT = 64  # tabs: with one per joint the size of a long chain is quadratic
 DECIMALS = 6  # decimals of degrees and of the file's unit of length
@@ -23,7 +24,8 @@ def write(motion: EulerMotion) -> bytes:
     for node in motion.nodes:
         if node.frame is AxesConvention.EXTRINSIC or node.pivots is not NO_PIVOTS:
             raise UnsupportedError("a BVH has intrinsic angles and no pivots", where=f"node '{node.name}'")
-    times = _frame_times(motion)
+    axis = _frame_times(motion)
+    times = axis.times
     lines = ["HIERARCHY"]
     children: dict[int, list[int]] = {}
     for number, node in enumerate(motion.nodes):
@@ -39,7 +41,7 @@ def write(motion: EulerMotion) -> bytes:
         node, below = motion.nodes[number], children.get(number, [])
         lines += _open_joint(node, depth, is_leaf=not below)
         if not node.end:
-            columns += _columns(node, times, _has_position(node))
+            columns += _columns(node, axis, _has_position(node))
             waiting.append("\t" * min(depth, MAX_INDENT) + "}")
             waiting += [(child, depth + 1) for child in reversed(below)]
     step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1 / 30
@@ -50,15 +52,15 @@ def write(motion: EulerMotion) -> bytes:
     return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
 
 
-def _frame_times(motion: EulerMotion) -> Floats:
+def _frame_times(motion: EulerMotion) -> TimeAxis:
     curves = [c for node in motion.nodes for c in (*node.rotation, *node.moves.values()) if c is not None]
     if not curves:
         raise UnsupportedError("nothing moves: a BVH needs frames")
-    times = max((curve.times for curve in curves), key=len)
-    steps = np.diff(times)
+    axis = max((curve.time_axis for curve in curves), key=lambda each: len(each.times))
+    steps = np.diff(axis.times)
     if len(steps) and np.ptp(steps) > 1e-3 * steps.mean():
         raise UnsupportedError("keys are not evenly spaced, as a BVH requires", help="choose a frame rate with `fps`")
-    return times
+    return axis
 
 
 def _open_joint(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
@@ -79,14 +81,20 @@ def _has_position(node: EulerNode) -> bool:
     return bool(node.moves) or node.parent < 0
 
 
-def _columns(node: EulerNode, times: Floats, with_position: bool) -> list[Floats]:
+def _columns(node: EulerNode, axis: TimeAxis, with_position: bool) -> list[Floats]:
     columns = []
-    for axis in range(3) if with_position else ():
-        curve = node.moves.get(axis)
-        columns.append(np.full(len(times), node.translation[axis]) if curve is None else evaluate(curve, times))
+    for i in range(3) if with_position else ():
+        columns.append(_at_frames(node.moves.get(i), node.translation[i], axis))
     for angle, turn in zip(node.angles.tolist(), node.rotation, strict=True):
-        columns.append(np.degrees(np.full(len(times), angle) if turn is None else evaluate(turn, times)))
+        columns.append(np.degrees(_at_frames(turn, angle, axis)))
     return columns
+
+
+def _at_frames(curve: Curve | None, constant: float, axis: TimeAxis) -> Floats:
+    """Values (F,) of a curve at the frames; its own ones on the axis of all, as is usual."""
+    if curve is None:
+        return np.full(len(axis.times), constant)
+    return curve.values if curve.time_axis is axis else evaluate(curve, axis.times)
 
 
 def _format_vector(vector: Floats) -> str:
