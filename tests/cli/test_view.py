@@ -282,6 +282,17 @@ def test_the_page_of_a_bake_shows_what_is_in_it_and_warns_of_the_rest(
         assert panel["about"] == f"Only the meshes in a.npz are shown: {warning}"
         (row,) = panel["rows"]
         assert (row["cells"], row["link"]["node"]) == (["statue", "3818 vertices"], STATUE)
+
+
+@pytest.mark.slow
+@needs_page
+def test_the_page_of_a_bake_in_other_orders_and_of_other_meshes(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _write_with_statue(Path("a.glb"))
+    options = ("--clip", "wave", "--fps", "4", "--html", "b.html")
+    call("bake", "a.glb", "a.npz", *options)
     call("view", "a.npz", "a.glb", "-o", "w.html").product()
     assert facts(Path("w.html").read_bytes())["hidden"] == [[], [STATUE]]
     call("bake", "a.glb", "a.npz", *options, "--rigid")
