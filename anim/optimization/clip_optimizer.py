@@ -13,6 +13,7 @@ from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Effort, Request
 from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.plan import Solution
+from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.optimization.verification import Verification, verify
@@ -139,6 +140,8 @@ def optimize_clip(optimizer: ClipOptimizer, item: tuple[int, Task]) -> ClipResul
     is_exact = context.bounds.max_error == 0
     if best is not None and (is_exact or _keys(best.solution.clip) < MAX_REDUCED_KEY_FRACTION * _keys(task.clip)):
         return best
+    if best is not None and best.solution.size(context.coding) <= _min_lossless_bytes(context, task.clip):
+        return best
     exact = solve(replace(context, bounds=replace(context.bounds, max_error=0.0)), task)
     assert exact is not None
     if best is not None and best.solution.size(context.coding) <= exact.size(context.coding):
@@ -146,6 +149,13 @@ def optimize_clip(optimizer: ClipOptimizer, item: tuple[int, Task]) -> ClipResul
     if best is None and not is_exact:
         return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=True)
     return _verify(optimizer, number, exact)
+
+
+def _min_lossless_bytes(context: Context, clip: Clip) -> float:
+    """Bytes that the lossless version takes at least."""
+    if context.policy.drop_invisible:  # its channels of nodes without vertices are dropped
+        return 0.0
+    return min_lossless_bytes(clip.tracks, context.coding.byte_costs)
 
 
 def _verify(optimizer: ClipOptimizer, number: int, solution: Solution) -> ClipResult:

@@ -68,6 +68,23 @@ def test_what_never_holds_is_kept_without_loss(monkeypatch: pytest.MonkeyPatch) 
     assert found.verdict.error.max_error <= 1e-9
 
 
+@pytest.mark.parametrize(("bytes_at_least", "searches"), [(1e9, [BOUND]), (0.0, [BOUND, 0.0])])
+def test_no_search_without_loss_that_cannot_be_smaller(
+    bytes_at_least: float, searches: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+
+    def watched(context: Context, task: Task) -> Solution | None:
+        asked.append(context.bounds.max_error)
+        return solve(context, task)
+
+    monkeypatch.setattr(site_, "solve", watched)
+    monkeypatch.setattr(site_, "MAX_REDUCED_KEY_FRACTION", 0.0)
+    monkeypatch.setattr(site_, "min_lossless_bytes", lambda *_: bytes_at_least)
+    assert optimize_clip(_site(), (0, _task(0.9 * BOUND))).verdict.holds
+    assert asked == searches
+
+
 def test_below_float32_nothing_is_lost() -> None:
     found = optimize_clip(_site(1e-13), (0, _task(1e-13)))
     assert found.verdict.usage <= 1
