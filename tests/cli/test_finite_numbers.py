@@ -80,6 +80,7 @@ def test_a_texture_scaled_beyond_float32_is_refused(ending: str, call: Call, tmp
         ("metersPerUnit = 0", "0", "m per unit"),
         ("metersPerUnit = -1", "0", "m per unit"),
         ("timeCodesPerSecond = -24", "0", "time codes per second"),
+        ("timeCodesPerSecond = inf", "0", "inf time codes per second"),  # took all time with a skeleton or points
         ("", "1e308", "the last frame is at"),
     ],
 )
