@@ -65,10 +65,11 @@ def body_seeds() -> Iterator[Seed]:
         extensions = make(document["nodes"])
         document["scenes"][0]["nodes"] = list(range(len(document["nodes"])))
         document |= {"extensions": extensions, "extensionsUsed": [KHR, *extensions]}
-        yield Seed("bodies.glb", {"bodies.glb": _pack(document, blob)}, ["bodies.glb"], BODY_LINES)
+        yield Seed("bodies.glb", {"bodies.glb": pack(document, blob)}, ["bodies.glb"], BODY_LINES)
 
 
-def _pack(document: Json, blob: bytes) -> bytes:
+def pack(document: Json, blob: bytes) -> bytes:
+    """Return a GLB."""
     content = json.dumps(document).encode()
     content += b" " * (-len(content) % 4)
     chunks = struct.pack("<I4s", len(content), b"JSON") + content + struct.pack("<I4s", len(blob), b"BIN\0") + blob
@@ -85,7 +86,7 @@ def _chain(extensions: Json) -> bytes:
     document["nodes"][0]["children"] = [*document["nodes"][0].get("children", []), first]
     if extensions:
         document |= {"extensions": extensions, "extensionsUsed": list(extensions)}
-    return _pack(document, blob)
+    return pack(document, blob)
 
 
 def _vrm1() -> Json:
