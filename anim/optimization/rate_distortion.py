@@ -16,7 +16,7 @@ FIRST_ENTRY, FIRST_STEP = 12, 4  # of the table: 1e-3 of the diagonal, and its n
 SIZE_MARGIN = 3e-3  # of the animation's bytes: sizes between two entries are estimates
 BOUND_STEP_FACTOR = 1.05  # between the bounds that a search may return
 BOUND_EXPONENT_PER_SIZE = 16.0  # a bound 17 % larger saves about a percent of the animation's bytes
-MAX_STEP_FACTOR = 4.0  # of a bound whose result was too large
+MAX_STEP_FACTOR = 4.0  # of a bound whose result was too large or too small
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +76,19 @@ def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) 
     return _rounded(max(bound, MIN_BOUND_PER_DIAGONAL * diagonal) * factor, diagonal)
 
 
+def bound_below(point: RatePoint, max_bytes: int) -> float:
+    """Return a bound, m, that is likely too small, where a result leaves bytes unused.
+
+    Its geometric mean with the result's own bound is the one that is likely to use them all.
+    """
+    excess = min(1 + (max_bytes - point.size) / max(point.animation, 1), 2.0)
+    factor = min(max(excess ** (2 * BOUND_EXPONENT_PER_SIZE), TABLE_FACTOR), MAX_STEP_FACTOR**2)
+    return float(point.max_error / factor)
+
+
 def bound_between(low: float, high: float, diagonal: float) -> float | None:
     """Return a bound, m, between two of which the lower one is taken for too small; None if they are too near."""
-    middle = _rounded(math.sqrt(low * high), diagonal) if low else high
+    middle = _rounded(math.sqrt(low * high), diagonal) if low and diagonal else high
     return middle if middle < high / math.sqrt(BOUND_STEP_FACTOR) else None
 
 

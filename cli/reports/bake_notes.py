@@ -11,6 +11,7 @@ from anim.model import Clip, MeshInstance, Scene
 from anim.skinning.analysis.inbetween_error import InbetweenError
 from anim.skinning.analysis.method_deviation import Deviation
 from anim.skinning.bake import bakeable_instances
+from anim.units import plural
 from cli import text
 from cli.text import Reporter
 
@@ -58,12 +59,12 @@ def only_baked_words(left_out: Sequence[MeshInstance], baked: str) -> str:
     count = sum(len(each.mesh.positions) for each in left_out)
     rigid = sum(len(each.mesh.positions) for each in left_out if each.skin is None and not len(each.mesh.targets))
     parts = [_skipped_words(rigid)] if rigid else []
-    parts += [f"skipped {count - rigid} vertices of other meshes"] if count > rigid else []
+    parts += [f"skipped {plural(count - rigid, 'vertex', 'vertices')} of other meshes"] if count > rigid else []
     return f"Only the meshes in {baked} are shown: {', '.join(parts)}"
 
 
 def _skipped_words(count: int) -> str:
-    return f"skipped {count} vertices of unskinned meshes (include with --rigid)"
+    return f"skipped {plural(count, 'vertex', 'vertices')} of unskinned meshes (include with --rigid)"
 
 
 def clamped_range_note(

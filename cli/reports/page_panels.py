@@ -116,7 +116,8 @@ def advice_for(file: str, advice: str) -> str:
     advice_for("walk.glb", "gltf-anim trim IN OUT --rebase") → "gltf-anim trim walk.glb walk-new.glb --rebase"
     """
     name = PurePath(PurePath(file).name)
-    names = shlex.join([str(name), f"{name.stem}{NEW_SUFFIX}{name.suffix}"])
+    folder = "./" if str(name).startswith("-") else ""  # not an option
+    names = shlex.join([f"{folder}{name}", f"{folder}{name.stem}{NEW_SUFFIX}{name.suffix}"])
     return _IN_OUT.sub(lambda found: f"{found[1]} {names}", advice, count=1)
 
 

@@ -1,16 +1,16 @@
-"""Search for the smallest error within a byte limit: sizes by fast searches, then one full search."""
+"""Search for the smallest error within a byte limit: sizes by fast searches, then few full ones."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import (
     MAX_BOUND_PER_DIAGONAL,
-    TABLE_FACTOR,
     RatePoint,
+    bound_below,
     bound_between,
     next_bound,
     smallest_bound,
@@ -24,9 +24,17 @@ from cli.workflows.optimize_job import OptimizeJob, with_bound
 FAST = "fast"  # effort of sizes that are tried
 USUAL_RATIO = 0.985  # bytes of animation after a longer search, as a fraction of those after a fast one
 SAMPLED_CLIPS = 4  # one clip of so many measures that ratio
-MAX_FULL_SEARCHES = 4  # until a result fits
+MAX_FULL_SEARCHES = 4  # until a result fits; the last one at the largest bound
 MAX_UNUSED_FRACTION = 0.015  # of the animation's bytes; more are worth another search
 MAX_REFINEMENTS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Result:
+    """A result with its size and error."""
+
+    optimized: Optimized
+    point: RatePoint
 
 
 class ByteLimit:
@@ -42,51 +50,57 @@ class ByteLimit:
 
         ceiling: m, the greatest allowed error; None for a tenth of the diagonal. Raises CheckError if nothing fits.
         """
-        job = self._job
-        most = MAX_BOUND_PER_DIAGONAL * job.scale if ceiling is None else ceiling
-        if ceiling is not None and self._estimate(request, most).size > self._max_bytes:
-            self._check_fit(job.sized(request, most))
+        most = MAX_BOUND_PER_DIAGONAL * self._job.scale if ceiling is None else ceiling
         bound = smallest_bound(
             self._max_bytes,
-            job.scale,
+            self._job.scale,
             lambda max_error: self._estimate(request, max_error),
             lambda max_error: self._ratio(request, max_error),
             usual_ratio=1.0 if request.effort == FAST else USUAL_RATIO,
         )
-        if bound is None:
-            self._check_fit(job.sized(request, most))
-        bound = most if bound is None else min(bound, most)
-        for _ in range(MAX_FULL_SEARCHES):
-            found = job.run(with_bound(request, bound))
-            point = job.point(bound, found)
-            if point.size <= self._max_bytes:
-                return self._with_less_error(request, found, point)
-            if bound >= most:
-                break
-            bound = min(next_bound(bound, job.scale, point, self._max_bytes), most)
-        found = job.run(replace(with_bound(request, most), effort=FAST))  # no longer search fits
-        self._check_fit(job.point(most, found))
-        return with_bound(request, most), found
+        found = self._full_searches(request, most if bound is None else min(bound, most), most)
+        best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
+        if best is None:
+            found.append(self._search(replace(request, effort=FAST), most))  # no longer search fits
+            if not self._fits(found[-1]):
+                raise self._refusal([*(each.point for each in found), self._estimate(request, 0.0)], most)
+            best = found[-1]
+        return with_bound(request, best.point.max_error), best.optimized
 
-    def _with_less_error(self, request: Request, found: Optimized, point: RatePoint) -> tuple[Request, Optimized]:
-        """The request and the result with a smaller bound, if many bytes are unused, as with jumps in a file's sizes.
+    def _full_searches(self, request: Request, bound: float, most: float) -> list[_Result]:
+        """Results of verified searches: at larger bounds until one fits, then at smaller ones while bytes are unused.
 
-        found, point: a result that fits.
+        Sizes jump in files of few keys, so that the first bound that fits can be far from the smallest.
         """
-        low, diagonal = point.max_error / TABLE_FACTOR, self._job.scale
+        found = [self._search(request, bound)]
+        while not self._fits(found[-1]) and found[-1].point.max_error < most:
+            point = found[-1].point
+            is_last = len(found) == MAX_FULL_SEARCHES - 1
+            larger = most if is_last else next_bound(point.max_error, self._job.scale, point, self._max_bytes)
+            found.append(self._search(request, min(larger, most)))
+        if not self._fits(found[-1]):
+            return found
+        failed = max((each.point.max_error for each in found[:-1]), default=0.0)
+        best = found[-1].point
         for _ in range(MAX_REFINEMENTS):
-            if self._max_bytes - point.size <= MAX_UNUSED_FRACTION * point.animation:
+            low = max(bound_below(best, self._max_bytes), failed)
+            between = bound_between(low, best.max_error, self._job.scale)
+            if between is None or self._max_bytes - best.size <= MAX_UNUSED_FRACTION * best.animation:
                 break
-            bound = bound_between(low, point.max_error, diagonal)
-            if bound is None:
-                break
-            other = self._job.run(with_bound(request, bound))
-            sized = self._job.point(bound, other)
-            if sized.size <= self._max_bytes:
-                found, point = other, sized
+            found.append(self._search(request, between))
+            if self._fits(found[-1]):
+                best = found[-1].point
             else:
-                low = bound
-        return with_bound(request, point.max_error), found
+                failed = between
+        return found
+
+    def _search(self, request: Request, bound: float) -> _Result:
+        """A search with verification."""
+        found = self._job.run(with_bound(request, bound))
+        return _Result(found, self._job.point(bound, found))
+
+    def _fits(self, result: _Result) -> bool:
+        return result.point.size <= self._max_bytes
 
     def _estimate(self, request: Request, max_error: float) -> RatePoint:
         """The size at a bound, in m, by a fast search without verification."""
@@ -112,16 +126,15 @@ class ByteLimit:
         sizes = {i: sum(track.values.size for track in self._job.clips[i].tracks) for i in clips}
         return sorted(sorted(sizes, key=lambda i: -sizes[i])[::SAMPLED_CLIPS])
 
-    def _check_fit(self, point: RatePoint) -> None:
-        if point.size <= self._max_bytes:
-            return
+    def _refusal(self, points: Iterable[RatePoint], most: float) -> CheckError:
+        """The error for a limit that none of the points meets. most: m, the largest bound."""
         job = self._job
-        percent = f" ({format_number(100 * point.max_error / job.scale, 2)} %)" if job.scale else ""
+        least = min(points, key=lambda point: point.size)
+        percent = f" ({format_number(100 * most / job.scale, 2)} %)" if job.scale else ""
         kept = optimize_report.retained_keys(job.source.document, job.chosen)
-        raise CheckError(
-            f"doesn't fit {plural(self._max_bytes, 'byte')}: "
-            f"with an error of up to {format_length(point.max_error)}{percent} it still takes "
-            f"{plural(point.size, 'byte')}, {point.animation} of them animation; "
+        return CheckError(
+            f"doesn't fit {plural(self._max_bytes, 'byte')}: with an error of up to {format_length(most)}{percent} "
+            f"it still takes {plural(least.size, 'byte')}, {least.animation} of them animation; "
             f"{kept}{'; ' if kept else ''}nothing was written",
-            help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {point.size}",
+            help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {least.size}",
         )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from anim.gltf.io import container
@@ -13,6 +15,7 @@ from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Effort, Request
 from cli.workflows import byte_limit
 from cli.workflows.optimize_job import OptimizeJob
+from fixtures.broken.pieces import buffered, glb
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import refusal
@@ -83,6 +86,33 @@ def test_unused_bytes_are_worth_another_search(
         assert output.stat().st_size <= 5600
         errors.append(max(each["max_error_m"] for each in run.json["clips"]))
     assert errors[1] <= errors[0]
+
+
+def test_what_the_whole_search_reaches_fits(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """Also below what a fast search reaches, by which sizes are estimated."""
+    sizes = {}
+    for effort in ("fast", "balanced"):
+        path = tmp_path / f"{effort}.glb"
+        assert call("optimize", fixture("noop"), path, "--max-error", "0.5%", "--effort", effort).code == 0
+        sizes[effort] = path.stat().st_size
+    assert sizes["balanced"] < sizes["fast"]
+    limit = str(sizes["balanced"])
+    run = call("optimize", fixture("noop"), tmp_path / "out.glb", "--max-error", "0.5%", "--max-bytes", limit)
+    assert run.code == 0, run.err
+    assert (tmp_path / "out.glb").stat().st_size <= sizes["balanced"]
+
+
+def test_a_model_without_size(tmp_path: Path, call: Call) -> None:
+    times = np.arange(30) / 30
+    arrays = buffered(("SCALAR", 5126, times), ("VEC3", 5126, np.outer(np.sin(7 * times), [0, 1, 0])))
+    channels = [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]
+    clip = {"name": "rise", "samplers": [{"input": 0, "output": 1}], "channels": channels}
+    nodes = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "a"}]}
+    source = tmp_path / "node.glb"
+    source.write_bytes(glb(json.dumps({**nodes, **arrays, "animations": [clip]}).encode()))
+    for limit in (source.stat().st_size - 200, 100):
+        run = call("optimize", source, tmp_path / "out.glb", "--max-error", "5mm", "--max-bytes", str(limit), *FAST)
+        assert (run.code, "bug" in run.err) in ((0, False), (6, False)), run.err
 
 
 def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:

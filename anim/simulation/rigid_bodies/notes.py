@@ -12,6 +12,7 @@ from anim.simulation.rigid_bodies.loop import BLEND_S
 from anim.simulation.rigid_bodies.motion import RigidMotion
 from anim.simulation.rigid_bodies.rapier.world import find_approximations, plane_reach
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
+from anim.units import format_number
 
 MIN_OVERLAP_PER_RADIUS = 0.02  # of the smaller body; less is the tolerance of contacts
 SHEAR_TOLERANCE = 1e-3
@@ -72,7 +73,8 @@ def _far(rigid: RigidScene, motion: RigidMotion) -> list[str]:
     reach = plane_reach(rigid)
     if apart <= reach:
         return []
-    return [f"a body is {apart:.3g} m from the others' start: planes end at {reach:.3g} m for hulls"]
+    far, end = format_number(apart, 3), format_number(reach, 3)
+    return [f"a body is {far} m from the others' start: planes end at {end} m for hulls"]
 
 
 def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:

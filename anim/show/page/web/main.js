@@ -85,15 +85,16 @@ function unless(isDefault, value) {
   return isDefault ? null : value;
 }
 
-/** The clip in the address: its name, or "#" and its index where a clip before it has the same name. */
+/** The clip in the address: its name, or "#" and its index where a clip before it has the same name, or it reads so. */
 function clipText({ clipNames }, index) {
-  return clipNames.indexOf(clipNames[index]) === index ? clipNames[index] : `#${index}`;
+  const name = clipNames[index];
+  return clipNames.indexOf(name) === index && !/^#\d+$/.test(name) ? name : `#${index}`;
 }
 
 /** Index of the clip that the address names, -1 for none. */
 function clipIndex({ clipNames }, text) {
-  const named = clipNames.indexOf(text);
-  return named >= 0 ? named : clipNames.findIndex((_, i) => `#${i}` === text);
+  const numbered = clipNames.findIndex((_, i) => `#${i}` === text);
+  return numbered >= 0 ? numbered : clipNames.indexOf(text);
 }
 
 function connect(player) {

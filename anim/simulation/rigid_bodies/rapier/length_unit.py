@@ -31,7 +31,8 @@ def choose_unit(scene: RigidScene) -> float:
     if least >= MIN_RADIUS_M:
         return 1.0
     most = MAX_PLANE_REACH_UNITS / (PLANE_REACH_PER_SPREAD * max(_spread(scene), 1.0))
-    exponent = min(math.ceil(math.log2(ENLARGED_RADIUS_UNITS / least)), math.floor(math.log2(most)))
+    wanted = min(ENLARGED_RADIUS_UNITS / max(least, ENLARGED_RADIUS_UNITS / MAX_UNITS_PER_METRE), MAX_UNITS_PER_METRE)
+    exponent = min(math.ceil(math.log2(wanted)), math.floor(math.log2(most)))
     return min(max(2.0**exponent, 1.0), MAX_UNITS_PER_METRE)
 
 

@@ -131,6 +131,7 @@ def test_planes_reach_over_the_scene() -> None:
 
     large = body(Shape("box", (1.0, 1.0, 1.0)), (900, 0, 0))
     assert plane_reach(scene(large)) == 500
+    assert choose_unit(scene(body(Shape("sphere", (1e-310,))))) == 1024
     assert plane_reach(scene(bolt(), bolt((8, 0, 0)))) >= 16
     assert choose_unit(scene(bolt(), large)) == 4  # smaller than it needs: the plane has to reach 900 m
     assert plane_reach(scene(bolt(), large)) >= 1800
