@@ -35,7 +35,8 @@ def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: s
             source, scene, baked = (one, old, other) if is_first else (other, new, one)
             content = bake_content(source, meshes, partners, is_first=is_first)
             words = bake_notes.only_baked_words(left_out_instances(scene, content), baked.name)
-            return with_left_out(content, scene, words)
+            num_others = max(counts[0 if is_first else 1] - 1, 0) if partners else 0
+            return with_left_out(content, scene, words, clips=num_others)
         ruler = ErrorMetric(old, new, clips=clips[0] + clips[1])
         return compare_content(ruler, *clips, compare_clips(ruler, *clips))
     except AnimError as error:

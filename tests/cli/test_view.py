@@ -280,8 +280,9 @@ def test_the_page_of_a_bake_shows_what_is_in_it_and_warns_of_the_rest(
         assert said["hidden"] == [[STATUE], []]
         panel = said["panels"][place]
         assert panel["about"] == f"Only the meshes in a.npz are shown: {warning}"
-        (row,) = panel["rows"]
-        assert (row["cells"], row["link"]["node"]) == (["statue", "3818 vertices"], STATUE)
+        statue, clips = panel["rows"]
+        assert (statue["cells"], statue["link"]["node"]) == (["statue", "3818 vertices"], STATUE)
+        assert clips["cells"] == ["2 other clips"]
 
 
 @pytest.mark.slow
@@ -329,7 +330,8 @@ def test_bakes_and_conversions_write_the_page_of_diff(
     said = facts((tmp_path / "b.html").read_bytes())
     assert [each["name"] for each in said["files"]] == ["biped.glb", "w.glb"]
     assert said["meshes"][0]
-    assert [each["title"] for each in said["panels"]] == ["Largest errors"]
+    assert [each["title"] for each in said["panels"]] == ["Largest errors", "Not in the bake"]
+    assert [each["cells"] for each in said["panels"][1]["rows"]] == [["2 other clips"]]
     assert "c.html  " in call("convert-cache", "out/w.glb", "out/w.npz", "--html", "c.html").err
     said = facts((tmp_path / "c.html").read_bytes())
     assert [each["name"] for each in said["files"]] == ["w.glb", "w.npz"]

@@ -31,19 +31,21 @@ def left_out_instances(scene: Scene, content: PageContent) -> list[MeshInstance]
     return [each for each in scene.instances if each.node in hidden and len(each.mesh.positions)]
 
 
-def with_left_out(content: PageContent, scene: Scene, about: str) -> PageContent:
-    """Return the content of a page of a bake with a panel of the meshes that are not in it.
+def with_left_out(content: PageContent, scene: Scene, about: str, *, clips: int = 0) -> PageContent:
+    """Return the content of a page of a bake with a panel of the meshes, and the number of clips, that are not in it.
 
-    scene: of the source. about: a sentence above them. Links are those of the source, so only of a first file.
+    scene: of the source. about: a sentence above the meshes. Links are those of the source, so only of a first file.
     """
     found = left_out_instances(scene, content)
-    if not found:
+    if not found and not clips:
         return content
     is_linked = bool(content.hidden[0])
     rows = [_row(scene, each, is_linked=is_linked) for each in found[:MAX_ROWS]]
     if len(found) > MAX_ROWS:
         rows.append(PageRow((f"{len(found) - MAX_ROWS} more",)))
-    panel = PagePanel("Not in the bake", tuple(rows), about=about)
+    if clips:
+        rows.append(PageRow((plural(clips, "other clip"),)))
+    panel = PagePanel("Not in the bake", tuple(rows), about=about if found else "")
     return replace(content, panels=(*content.panels, panel))
 
 

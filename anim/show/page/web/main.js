@@ -14,13 +14,15 @@ import { fillSidebar, markLink, markNode, markTab, scrollToChosen, showSide } fr
 import { Side } from "./side.js";
 import { OF_NODES, SHOWS, SIDES, UNITS, hashText, onChange, readHash, state, toggleShow, update, writeHash } from "./state.js";
 
+const NO_CLIP = "no animation";
+
 /** Bring the page in line with what changed. */
 function render(player, changed) {
   const has = (...names) => names.some((name) => changed.has(name));
   player.isDirty = true;
   if (has("clip")) {
     markClip(state.clip);
-    $("#clip-name").textContent = player.sides[0].clipNames[state.clip] ?? "";
+    $("#clip-name").textContent = player.sides[0].clipNames[state.clip] ?? NO_CLIP;
     player.resetHeatScale();
     player.applyMaterials();
   }
