@@ -6,16 +6,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.check.finding import Occurrence
 from anim.check.track_table import TrackTable, track_table
 from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import reader
+from anim.maths import quaternion
 from anim.measure.error.surface import diagonal
 from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Clip, Scene, Skeleton, Track
+from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.sampling.pose import rest_world
 
 
@@ -87,19 +88,48 @@ class CheckedFile:
         for clip, count in table.per_clip(counts):
             yield self.in_clip(clip, count)
 
+    def at_keys(self, table: TrackTable, marked: Bools) -> Iterator[Occurrence]:
+        """Yield an occurrence for each clip with marked keys (S,), at the first of them."""
+        for clip, count in table.per_clip(table.count(marked)):
+            node, time_s = table.first_key(clip, marked)
+            yield self.in_clip(clip, count, time_s=time_s, node=node)
+
+    def at_rotation_steps(
+        self, counts: Mapping[int, int], interpolation: Interpolation, is_fault: Callable[[Floats], Bools]
+    ) -> Iterator[Occurrence]:
+        """Yield an occurrence for each clip with a count above 0, at its first step that is a fault.
+
+        counts: by index of the clip. is_fault: a mask (S,) from the dot products (S,) of keys with those before them.
+        """
+        clips = {number: self.contents.clips[number] for number, count in counts.items() if count}
+        table = track_table(clips.items(), "rotation", lambda track: track.interpolation is interpolation)
+        marked = table.inner_steps()
+        marked[1:] &= is_fault(quaternion.dot(table.values[1:], table.values[:-1]))
+        at = {number: table.first_key(number, marked) for number, _ in table.per_clip(table.count(marked))}
+        for number in clips:
+            node, time_s = at.get(number, (None, None))  # without one: tracks of pointers
+            yield self.in_clip(number, counts[number], time_s=time_s, node=node)
+
     def clips(self) -> Iterator[tuple[ClipReport, Clip]]:
         """Yield the chosen, readable clips with their reports."""
         for report in self.facts.clips:
             yield report, self.contents.clips[report.index]
 
     def in_clip(
-        self, number: int, count: int = 1, value: float = 0.0, *, problem: str = "", time_s: float | None = None
+        self,
+        number: int,
+        count: int = 1,
+        value: float = 0.0,
+        *,
+        problem: str = "",
+        time_s: float | None = None,
+        node: int | None = None,
     ) -> Occurrence:
         """Return an occurrence in a clip by its index."""
         name = self.contents.clips[number].name
         label = reader.clip_label(name, number)
         return Occurrence(
-            label, f"/animations/{number}", count, value, problem, number=number, name=name, time_s=time_s
+            label, f"/animations/{number}", count, value, problem, number=number, name=name, time_s=time_s, node=node
         )
 
     def in_node(self, number: int, count: int = 1, value: float = 0.0, *, problem: str = "") -> Occurrence:

@@ -25,7 +25,8 @@ class Occurrence:
 
     label: the part ("clip 'walk'"). pointer: its JSON pointer. count: number of faults in it. value: the largest of
     them, in the unit of the rule. problem: the observation, for rules whose `Rule.problem` does not write it.
-    number: index of the part among its kind (clip, node, skin), name: its name. time_s: time of the largest fault.
+    number: index of the part among its kind (clip, node, skin), name: its name. time_s, node: time and node of the
+    largest or first fault in a clip, where it has one.
     """
 
     label: str
@@ -37,6 +38,7 @@ class Occurrence:
     number: int = -1
     name: str = ""
     time_s: float | None = None
+    node: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

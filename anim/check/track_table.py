@@ -13,13 +13,14 @@ from anim.model import Clip, Track
 
 @dataclass(frozen=True, slots=True)
 class TrackTable:
-    """Keys (S, C) of T tracks with a node, one after the other. clips, nodes, starts, counts: (T,)."""
+    """Keys (S, C) of T tracks with a node, one after the other. clips, nodes, starts, counts: (T,). times: (S,) s."""
 
     clips: Ints
     nodes: Ints
     starts: Ints
     counts: Ints
     values: Floats
+    times: Floats
 
     def count(self, marked: Bools) -> Ints:
         """Return the number of marked keys (S,) of each track (T,)."""
@@ -41,6 +42,13 @@ class TrackTable:
         """Yield the index of each clip with counts (T,) of its tracks above 0, and their sum."""
         for clip in dict.fromkeys(self.clips[counts > 0].tolist()):
             yield clip, int(counts[self.clips == clip].sum())
+
+    def first_key(self, clip: int, marked: Bools) -> tuple[int, float]:
+        """Return node and time, s, of the earliest of the marked keys (S,) of a clip."""
+        keys = np.flatnonzero(marked & np.repeat(self.clips == clip, self.counts))
+        first = int(keys[self.times[keys].argmin()])
+        track = int(np.searchsorted(self.starts, first, side="right")) - 1
+        return int(self.nodes[track]), float(self.times[first])
 
     def targets(self, marked: Bools) -> set[tuple[int, int]]:
         """Return clip and node of each marked track (T,)."""
@@ -65,4 +73,5 @@ def track_table(
         np.cumsum(counts) - counts,
         counts,
         np.concatenate(values) if values else np.zeros((0, 4 if path == "rotation" else 3)),
+        np.concatenate([track.times for _, track in found]) if found else np.zeros(0),
     )

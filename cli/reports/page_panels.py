@@ -107,7 +107,8 @@ def _finding_row(finding: Finding, found: Sequence[Occurrence], document: Docume
     links = [(each.label, _link(each, document)) for each in found]
     parts = tuple((label, link) for label, link in links if link is not None) if len(found) > 1 else ()
     advice = advice_for(name, finding.advice)
-    return PageRow(cells, _link(finding, document), finding.severity.value, words, advice, parts)
+    link = _link(found[0] if found else finding, document)
+    return PageRow(cells, link, finding.severity.value, words, advice, parts)
 
 
 def advice_for(file: str, advice: str) -> str:
@@ -126,6 +127,8 @@ def _link(found: Finding | Occurrence, document: Document) -> PageLink | None:
     clip, node, skin = (_index(pattern, found.pointer) for pattern in (_CLIP, _NODE, _SKIN))
     if skin is not None:
         node = document.json["skins"][skin]["joints"][0]
+    if isinstance(found, Occurrence) and found.node is not None:
+        node = found.node
     if clip is None and node is None and found.time_s is None:
         return None
     return PageLink(clip, node, found.time_s)

@@ -266,6 +266,14 @@ def test_a_bake_beside_its_source(fixture: Fixture, call: Call, tmp_path: Path) 
 
 
 @needs_page
+def test_findings_lead_to_clip_node_and_time(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    call("inspect", fixture("noop"), "--html", tmp_path / "i.html").product()
+    links = {each["cells"][0]: each["link"] for each in facts((tmp_path / "i.html").read_bytes())["panels"][0]["rows"]}
+    for name in ("wide-steps", "sign-flips", "loop-seam"):
+        assert None not in links[name].values()
+
+
+@needs_page
 def test_the_page_of_a_bake_shows_what_is_in_it_and_warns_of_the_rest(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

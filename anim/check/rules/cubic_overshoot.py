@@ -20,9 +20,9 @@ SAMPLES = np.linspace(0, 1, 17)[1:-1, None, None]  # of a segment: a cubic's ext
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks."""
     for report, clip in file.clips():
-        tracks = sum(overshoot(track) > parameters["excess"] for track in clip.tracks)
+        tracks = [track for track in clip.tracks if overshoot(track) > parameters["excess"]]
         if tracks:
-            yield file.in_clip(report.index, tracks)
+            yield file.in_clip(report.index, len(tracks), node=max(tracks, key=overshoot).node)
 
 
 def overshoot(track: Track) -> float:

@@ -57,7 +57,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
                 f"'{file.skeleton.names[worst.node]}' slides by {100 * max(lengths):.2g} % of the figure's height at "
                 f"{worst.times[0]:.2f} s" + (f" (and in {count - 1} more contacts)" if count > 1 else "")
             )
-            yield file.in_clip(report.index, count, max(lengths), problem=problem, time_s=float(worst.times[0]))
+            at = float(worst.times[0])
+            yield file.in_clip(report.index, count, max(lengths), problem=problem, time_s=at, node=worst.node)
 
 
 def _skinned(file: CheckedFile) -> list[int]:

@@ -18,7 +18,10 @@ from anim.gltf.document import Document
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of trembling tracks."""
     motion = rotation_steps(file)
-    yield from file.per_clip(motion.table, (motion.table.count(_running(motion, parameters)) > 0).astype(np.int64))
+    table, running = motion.table, _running(motion, parameters)
+    for clip, count in table.per_clip((table.count(running) > 0).astype(np.int64)):
+        node, time_s = table.first_key(clip, running)
+        yield file.in_clip(clip, count, time_s=time_s, node=node)
 
 
 def _running(motion: RotationSteps, parameters: Parameters) -> Bools:

@@ -20,7 +20,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     angles = motion.angles
     around = np.max([np.roll(angles, by) for by in (-2, -1, 1, 2)], axis=0, initial=0.0)
     jumps = motion.is_inner & (angles > np.radians(parameters["angle"])) & (angles > RATIO * around)
-    yield from file.per_clip(motion.table, motion.table.count(np.asarray(jumps)))
+    yield from file.at_keys(motion.table, np.asarray(jumps))
 
 
 RULE = Rule(

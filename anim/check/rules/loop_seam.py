@@ -14,6 +14,7 @@ from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
 from anim.measure.inspect.frame_rate import GRID_TOLERANCE_FRAMES, estimate_frame_rate, usual_frame_rate
 from anim.measure.inspect.root_motion import root_motion_node
+from anim.measure.loops.joint_gaps import joint_gaps
 from anim.model import Clip
 from anim.units import format_number
 
@@ -29,7 +30,14 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         size = clip.seam_m / file.diagonal if file.diagonal else 0.0
         is_named = LOOP_NAME.search(clip.name) is not None
         if size > parameters["gap"] and (size < parameters["limit"] or is_named) and clip.duration_s > 0:
-            yield file.in_clip(clip.index, value=size, time_s=clip.end_s)
+            gaps = joint_gaps(file.motion, *_ends(file, clip.index)) if clip.seam_measured_on == "skin" else []
+            yield file.in_clip(clip.index, value=size, time_s=clip.end_s, node=gaps[0].node if gaps else None)
+
+
+def _ends(file: CheckedFile, number: int) -> tuple[Clip, float, float, int]:
+    """A clip with its start, end and root, whose translation is no gap."""
+    clip = file.contents.clips[number]
+    return clip, clip.start, clip.end, root_motion_node(file.skeleton, clip)
 
 
 def problem(found: Sequence[Occurrence]) -> str:

@@ -23,7 +23,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     dots = np.abs(quaternion.dot(values[1:], values[:-1]))
     angles[1:] = 2 * np.arccos(np.clip(dots, 0, 1))
     wide = table.inner_steps() & (angles > np.radians(parameters["angle"]))
-    yield from file.per_clip(table, table.count(np.asarray(wide)))
+    yield from file.at_keys(table, np.asarray(wide))
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

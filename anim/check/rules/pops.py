@@ -19,7 +19,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such keys."""
     motion = rotation_steps(file)
     popped, _ = _popped(motion, parameters["angle"])
-    yield from file.per_clip(motion.table, motion.table.count(popped))
+    yield from file.at_keys(motion.table, popped)
 
 
 def _cubic(keys: Floats, at: Ints) -> Floats:

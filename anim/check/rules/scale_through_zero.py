@@ -16,7 +16,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     table = file.scales
     flips = table.inner_steps()
     flips[1:] &= (table.values[1:] * table.values[:-1] < 0).any(axis=1)
-    yield from file.per_clip(table, table.count(np.asarray(flips)))
+    yield from file.at_keys(table, np.asarray(flips))
 
 
 RULE = Rule(

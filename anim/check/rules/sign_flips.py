@@ -16,10 +16,9 @@ from anim.model import Interpolation, Track
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips."""
-    for clip in file.facts.clips:
-        if count := clip.sign_flips - clip.sign_flips_in_splines:
-            yield file.in_clip(clip.index, count)
+    """Yield the clips, at their first sign change."""
+    counts = {clip.index: clip.sign_flips - clip.sign_flips_in_splines for clip in file.facts.clips}
+    yield from file.at_rotation_steps(counts, Interpolation.LINEAR, lambda dots: dots < 0)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule, counted
+from anim.model import Interpolation
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips."""
-    for clip in file.facts.clips:
-        if count := clip.sign_flips_in_splines:
-            yield file.in_clip(clip.index, count)
+    """Yield the clips, at their first sign change."""
+    counts = {clip.index: clip.sign_flips_in_splines for clip in file.facts.clips}
+    yield from file.at_rotation_steps(counts, Interpolation.CUBICSPLINE, lambda dots: dots < 0)
 
 
 RULE = Rule(

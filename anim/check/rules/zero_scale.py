@@ -20,7 +20,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such keys; under STEP they hide a node, which works everywhere."""
     table = file.tracks("scale", lambda track: track.interpolation is not Interpolation.STEP)
     zero = np.asarray((np.abs(table.values) < parameters["scale"]).any(axis=1))
-    yield from file.per_clip(table, table.count(zero))
+    yield from file.at_keys(table, zero)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

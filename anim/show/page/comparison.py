@@ -34,7 +34,7 @@ SHELL_MEASURED = (
 )
 BAKE_MEASURED = (
     "Distances of vertices, also between frames, where bakes and caches are interpolated: "
-    "a higher --fps lessens these. 99 % of all are below p99."
+    "a bake with more frames per second lessens these. 99 % of all are below p99."
 )
 UNITS = ((1.0, "m", 1.0), (1e-2, "cm", 1e2), (1e-4, "mm", 1e3), (1e-7, "µm", 1e6), (0.0, "nm", 1e9))
 

@@ -9,11 +9,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
-from anim.check.find import find_all
+from anim.check.find import find_all, occurrences
 from anim.check.finding import Finding
 from anim.check.selection import RuleSelection
 from anim.model import Track
-from tests.anim.check.cases import FRAMES, checked, found, jump, pop, step_of, tremble, with_tracks
+from tests.anim.check.cases import (
+    ARM_JOINTS,
+    FRAMES,
+    checked,
+    flipped_spline,
+    found,
+    jump,
+    pop,
+    rotation,
+    selection,
+    step_of,
+    tremble,
+    with_tracks,
+)
 from tests.clips import track
 from tests.files import opened_fixture
 
@@ -38,6 +51,25 @@ def test_planted_faults_are_found(code: str, plant: Plant) -> None:
     assert run(lambda degrees: degrees) == []
     others = {"GA301": jump, "GA302": pop, "GA303": jump}
     assert run(others[code]) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "tracks", "frame"),
+    [
+        ("GA301", [swing(pop)], 20),
+        ("GA302", [swing(jump)], 20),
+        ("GA303", [swing(tremble)], 11),
+        ("GA101", [rotation(0, 10, 185)], 60),
+        ("GA103", [rotation(0, 10, 20, sign=-1.0)], 60),
+        ("GA120", [flipped_spline()], None),
+    ],
+)
+def test_motion_has_a_time_and_a_node(code: str, tracks: list[Track], frame: int | None) -> None:
+    ((_, (occurrence, *_)),) = occurrences(checked(with_tracks(*tracks)), selection(code))
+    assert occurrence.node == ARM_JOINTS[1]
+    assert occurrence.time_s is not None
+    if frame is not None:
+        assert abs(occurrence.time_s * 30 - frame) < 1.1
 
 
 @pytest.mark.parametrize(("angle", "count"), [("13deg", 0), ("5deg", 1), ("0.0873rad", 1)])
