@@ -8,6 +8,7 @@ from pathlib import PurePath
 from typing import Any
 
 from anim.caches.transforms import statistics, up_axis, vertex_order
+from anim.errors import FormatError, RangeError, UnsupportedError
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.model import Clip, Scene, VertexCache
@@ -89,7 +90,19 @@ class BakeRun:
         self._uneven_joints: set[int] = set()
 
     def bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> None:
-        """Bake a clip into a file. nodes: of the meshes in the job's group, None for all."""
+        """Bake a clip into a file. nodes: of the meshes in the job's group, None for all.
+
+        An error names the clip, and the files that were written before.
+        """
+        try:
+            self._bake(job, nodes, clip)
+        except BaseException as error:
+            if job.clip is not None and isinstance(error, (FormatError, UnsupportedError, RangeError)):
+                error.at(reader.clip_label(clip.name, job.clip))
+            report_written(self.files, self._reporter, dry_run=self._file_options.dry_run)
+            raise
+
+    def _bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> None:
         group = self._baker(job.group, nodes)
         times, label = self._options.times(clip), reader.clip_label(clip.name, job.clip or 0)
         if group.scales is not None:
@@ -104,9 +117,6 @@ class BakeRun:
         source = self._source_option(job, nodes, clip)
         try:
             saved = self._file_options.save(cache, job.file, source)
-        except BaseException:
-            report_written(self.files, self._reporter, dry_run=self._file_options.dry_run)
-            raise
         finally:
             progress.close()
         if measured is not None:

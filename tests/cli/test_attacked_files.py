@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from fixtures.broken.pieces import buffered, text
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal
 from tests.fixtures.reading import split
@@ -47,3 +50,121 @@ def test_json_a_million_deep_is_named(name: str, call: Call, tmp_path: Path) -> 
     (tmp_path / name).write_text('{"a": ' + "[" * 10**6)
     line = ("inspect",) if name == "in.gltf" else ("from-euler",)
     assert name in refusal(call(*line, tmp_path / name, *([tmp_path / "out.glb"] * (name == "in.json"))), 3)
+
+
+def of_three_clips(tmp_path: Path) -> Path:
+    """A mesh whose second clip enlarges it beyond float32."""
+    sizes = np.ones((2, 3)), np.array([[1, 1, 1], [3e38] * 3])
+    arrays = buffered(
+        ("SCALAR", 5126, [0, 1]), ("VEC3", 5126, 2 * np.eye(3)), *(("VEC3", 5126, each) for each in sizes)
+    )
+    target = {"sampler": 0, "target": {"node": 0, "path": "scale"}}
+    clips = [
+        {"name": name, "samplers": [{"input": 0, "output": output}], "channels": [target]}
+        for name, output in (("sound", 2), ("huge", 3), ("last", 2))
+    ]
+    meshes = [{"primitives": [{"attributes": {"POSITION": 1}}]}]
+    scene = {"scenes": [{"nodes": [0]}], "nodes": [{"name": "n", "mesh": 0}], "meshes": meshes}
+    path = tmp_path / "in.gltf"
+    path.write_bytes(text({**scene, **arrays, "animations": clips}))
+    return path
+
+
+@pytest.mark.parametrize("ending", ["npz", "pc2", "mdd", "ply", "glb", "gltf", "png"])
+def test_a_later_clip_that_fails_is_named_with_what_was_written(ending: str, call: Call, tmp_path: Path) -> None:
+    path = of_three_clips(tmp_path)
+    options = ("--rigid", "--fps", "4", "--format", ending)
+    call("bake", path, tmp_path / f"alone-sound.{ending}", "--clip", "sound", *options).product()
+    alone = {name.name.removeprefix("alone-") for name in tmp_path.glob("alone-*")}
+    run = call("bake", path, tmp_path / f"{{clip}}.{ending}", *options)
+    assert run.code == 3
+    first, second = run.err.splitlines()[-2:]
+    assert first == f"note: 1 file written before: {tmp_path / f'sound.{ending}'}"
+    assert second.startswith(f"gltf-anim: {path}: clip 'huge', frame ")
+    assert second.endswith("is beyond float32 (got [inf, 0.0, 0.0])")
+    assert {each.name for each in tmp_path.iterdir()} - {"in.gltf"} == {*alone, *(f"alone-{name}" for name in alone)}
+
+
+def test_a_dry_run_of_a_clip_that_fails_names_no_files(call: Call, tmp_path: Path) -> None:
+    path = of_three_clips(tmp_path)
+    run = call("bake", path, tmp_path / "{clip}.npz", "--rigid", "--fps", "4", "--dry-run")
+    assert "clip 'huge', frame " in refusal(run, 3)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+BINARY = b"\xff\xfe\x80solid x\n"
+ASCII_STL = """solid Würfel
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid
+""".encode("latin-1")
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"solid x\nfacet normal 0 0 1\n" + BINARY, "has no vertices"),
+        (bytes(range(256)) * 2, "has no vertices"),
+        (ASCII_STL.replace(b"vertex 0 1 0\n", b""), "is no .stl that can be read"),
+        (b"endsolid solid" + BINARY, "is no .stl that can be read (endsolid precedes solid!)"),
+        (bytes(80) + b"\xff\xff\xff\xff" + bytes(50), "has no vertices"),
+    ],
+)
+def test_stl_that_is_no_text_in_utf_8_is_refused_by_its_fault(
+    data: bytes, words: str, call: Call, tmp_path: Path
+) -> None:
+    """And not by the package that would guess its encoding, which is not installed."""
+    (tmp_path / "in.stl").write_bytes(data)
+    assert words in refusal(call("convert-cache", tmp_path / "in.stl", tmp_path / "out.npz"), 3)
+
+
+def test_stl_of_text_in_latin_1_is_read(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "in.stl").write_bytes(ASCII_STL)
+    call("convert-cache", tmp_path / "in.stl", tmp_path / "out.npz").product()
+    assert np.load(tmp_path / "out.npz")["positions"].shape == (1, 3, 3)
+
+
+@pytest.mark.parametrize("scale", ["1e300", "1e16", "0"])
+def test_a_scale_beyond_all_lengths_is_wrong_usage(scale: str, call: Call, tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("time,a.rx\n0,0\n1,1\n")
+    said = refusal(call("from-euler", tmp_path / "in.csv", tmp_path / "out.glb", "--scale", scale), 2)
+    assert said.endswith("(expected a number above 0, at most 1e+15)")
+
+
+def test_an_array_header_that_does_not_end_is_refused(call: Call, tmp_path: Path) -> None:
+    data = io.BytesIO()
+    np.save(data, np.zeros((1, 3, 3), np.float32))
+    odd = data.getvalue().replace(b"), }", b"), ((", 1)
+    with zipfile.ZipFile(tmp_path / "in.npz", "w") as archive:
+        archive.writestr("positions.npy", odd)
+    assert "is damaged" in refusal(call("convert-cache", tmp_path / "in.npz", tmp_path / "out.pc2"), 3)
+
+
+LONG = "x" * 10**5
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"schema": LONG},
+        {"order": LONG},
+        {"unit": LONG},
+        {LONG: 1},
+        {"nodes": [{"name": "a", "parent": LONG, "curves": {}}]},
+        {"nodes": [{"name": "a", "curves": {LONG: {"times": [0], "values": [0]}}}]},
+        {"nodes": [{"name": "a", "curves": {"rotation.x": {"times": [0], "values": [0], "interpolation": LONG}}}]},
+        {"nodes": [{"name": LONG, "curves": {}}] * 2},
+    ],
+    ids=lambda change: str(change).replace(LONG, "LONG"),
+)
+def test_what_curves_say_is_cut_in_messages(change: dict[str, Any], call: Call, tmp_path: Path) -> None:
+    about = {"schema": "euler-curves/1", "order": "XYZ", "frame": "extrinsic", "unit": "deg", "nodes": []}
+    (tmp_path / "in.json").write_text(json.dumps({**about, **change}))
+    run = call("from-euler", tmp_path / "in.json", tmp_path / "out.glb")
+    refusal(run, 3)
+    assert max(map(len, run.err.splitlines())) < 800

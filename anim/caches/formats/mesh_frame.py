@@ -105,7 +105,7 @@ def _with_comment(data: bytes, opening: bytes, remark: bytes) -> bytes:
 
 
 def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray | None]:
-    from trimesh.exchange import ply, stl
+    from trimesh.exchange import ply
     from trimesh.geometry import triangulate_quads
 
     try:
@@ -113,7 +113,7 @@ def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray
         if ending == ".ply":  # fix_texture would merge vertices
             found = ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
         else:
-            found = stl.load_stl(io.BytesIO(data))
+            found = _read_stl(data)
         positions = np.asarray(found.get("vertices", np.empty((0, 3)))).reshape(-1, 3)
         faces = found.get("faces")
         triangles: Ints = (
@@ -123,6 +123,15 @@ def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray
         raise FormatError(f"is no {ending} that can be read ({' '.join(str(error).split())[:120]})") from None
     normals = found.get("vertex_normals")
     return positions, triangles.reshape(-1, 3), None if normals is None else np.asarray(normals, np.float32)
+
+
+def _read_stl(data: bytes) -> dict[str, Any]:
+    from trimesh.exchange import stl
+
+    try:
+        return stl.load_stl_binary(io.BytesIO(data))
+    except stl.HeaderError:  # text, or damaged; trimesh guesses its encoding by a package that may not be there
+        return stl.load_stl_ascii(io.BytesIO(data.decode("latin-1").encode()))
 
 
 def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:

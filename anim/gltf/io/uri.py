@@ -54,12 +54,12 @@ def relative_path(uri: str) -> str:
     """Return the path of a relative URI, percent-decoded, with forward slashes.
 
     Bytes that are not UTF-8 are decoded with `os.fsdecode`, so that the path names the file with these bytes.
-    Raises FormatError unless the path is in the file's folder: no scheme, no absolute path, no "..".
-    relative_path("walk%20data.bin") → "walk data.bin"
+    Raises FormatError unless the path is in the file's folder: no scheme, no absolute path, no ".." that leads out.
+    relative_path("walk%20data.bin") → "walk data.bin"; relative_path("a/../walk.bin") → "walk.bin"
     """
     if _SCHEME.match(uri):
         raise FormatError(f"URI '{_short(uri)}' has a scheme (only files beside this one are read)")
-    path = unquote(uri, errors="surrogateescape")
+    path = unquote(_without_dot_segments(uri), errors="surrogateescape")
     if not path or "\0" in path or not _is_encodable(path):
         raise FormatError(f"URI '{_short(uri)}' names no file")
     if path[0] in "/\\" or _SCHEME.match(path):
@@ -67,6 +67,18 @@ def relative_path(uri: str) -> str:
     if ".." in re.split(r"[/\\]", path):
         raise FormatError(f"URI '{_short(uri)}' leaves the file's folder (only files beside this one are read)")
     return path
+
+
+def _without_dot_segments(uri: str) -> str:
+    """The URI without ".." that cancel a folder before them (RFC 3986, 5.2.4); those that lead out remain."""
+    found: list[str] = []
+    segments = uri.split("/")
+    for segment in segments:
+        if segment == ".." and found and found[-1] not in ("", ".."):
+            found.pop()
+        elif segment != "." or ".." not in segments:
+            found.append(segment)
+    return "/".join(found)
 
 
 def from_path(path: str) -> str:
