@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from anim.arrays import Bools, Floats, Ints
 from anim.check.finding import Occurrence
 from anim.check.track_table import TrackTable, track_table
 from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import reader
 from anim.maths import quaternion
+from anim.maths.hierarchy import find_subtrees
 from anim.measure.error.surface import diagonal
 from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts
@@ -73,6 +76,17 @@ class CheckedFile:
     def joints(self) -> list[int]:
         """Indices of the nodes that are joints of a skin, sorted."""
         return sorted({joint for skin in json_array(self.json, "skins") for joint in skin["joints"]})
+
+    @cached_property
+    def subtrees(self) -> tuple[Ints, Ints]:
+        """First position (N,) of each node's subtree in depth-first order, and the one after its last."""
+        return find_subtrees(self.skeleton.parents)
+
+    def have_common_root(self, nodes: Sequence[int]) -> bool:
+        """Return whether some node is above all of these, or one of them."""
+        first, _ = self.subtrees
+        roots = np.sort(first[self.skeleton.parents < 0])
+        return len(np.unique(np.searchsorted(roots, first[nodes], side="right"))) == 1
 
     @cached_property
     def scales(self) -> TrackTable:

@@ -1,4 +1,7 @@
-"""Products along the paths from the roots of trees: one step per level, or few steps for deep and thin trees."""
+"""Trees of nodes: subtrees, and products along the paths from the roots.
+
+Products take one step per level, or few steps for deep and thin trees.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,27 @@ def accumulate(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Co
     if len(levels) < MIN_DEPTH or len(parents) > MAX_WIDTH * len(levels):
         return _by_level(local, parents, levels, compose)
     return _by_section(local, parents, levels, compose)
+
+
+def find_subtrees(parents: Ints) -> tuple[Ints, Ints]:
+    """Return the first position (N,) of each node's subtree in depth-first order, and the one after its last.
+
+    Node j is below node i if first[i] < first[j] < end[i]. parents: (N,), −1 for roots.
+    find_subtrees([-1, 0]) → [0, 1], [2, 2]
+    """
+    order = _depth_first(parents)
+    first = np.empty(len(parents), np.int64)
+    first[order] = np.arange(len(order))
+    return first, first + subtree_sums(parents, np.ones(len(parents))).astype(np.int64)
+
+
+def subtree_sums(parents: Ints, values: Floats) -> Floats:
+    """Return the sum (N,) of each node's value and those of all nodes below it. parents: (N,), −1 for roots."""
+    total, above = values.tolist(), parents.tolist()
+    for node in reversed(_depth_first(parents)):
+        if above[node] >= 0:
+            total[above[node]] += total[node]
+    return np.array(total, np.float64)
 
 
 def _by_level(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose) -> Floats:
@@ -54,3 +78,17 @@ def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: C
 def _index(nodes: Ints) -> Ints | slice:
     """The nodes as an index; a single one as a slice, which copies nothing."""
     return nodes if len(nodes) != 1 else slice(int(nodes[0]), int(nodes[0]) + 1)
+
+
+def _depth_first(parents: Ints) -> list[int]:
+    """All nodes, parents before those below them."""
+    children: list[list[int]] = [[] for _ in parents]
+    waiting: list[int] = []
+    for node, parent in enumerate(parents.tolist()):
+        (children[parent] if parent >= 0 else waiting).append(node)
+    waiting.reverse()
+    order = []
+    while waiting:
+        order.append(waiting.pop())
+        waiting += reversed(children[order[-1]])
+    return order

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.maths.hierarchy import find_subtrees
 from anim.skinning.binding import SkinBinding
 from anim.skinning.kernels.layout import FloatArray, Influences, ScaleShear, group_influences
 from anim.skinning.methods.skinner import lanes
@@ -102,38 +103,3 @@ def scale_fractions(rig: SkinBinding) -> FloatArray:
     fractions[alone] = np.arange(rig.max_count) == 0
     fractions /= np.maximum(fractions.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     return fractions[there].astype(np.float32)
-
-
-def find_subtrees(above: Ints) -> tuple[Ints, Ints]:
-    """Return the first position (J,) of each joint's subtree in depth-first order, and the one after its last.
-
-    Joint j is below joint i if first[i] < first[j] < end[i]. above: (J,), as in a rig.
-    find_subtrees([-1, 0]) → [0, 1], [2, 2]
-    """
-    order = _depth_first(above)
-    first = np.empty(len(above), np.int64)
-    first[order] = np.arange(len(order))
-    return first, first + subtree_sums(above, np.ones(len(above))).astype(np.int64)
-
-
-def subtree_sums(above: Ints, values: Floats) -> Floats:
-    """Return the sum (J,) of each joint's value and those of all joints below it. above: (J,), as in a rig."""
-    total, parents = values.tolist(), above.tolist()
-    for joint in reversed(_depth_first(above)):
-        if parents[joint] >= 0:
-            total[parents[joint]] += total[joint]
-    return np.array(total, np.float64)
-
-
-def _depth_first(above: Ints) -> list[int]:
-    """All joints, parents before those below them."""
-    children: list[list[int]] = [[] for _ in above]
-    waiting: list[int] = []
-    for joint, parent in enumerate(above.tolist()):
-        (children[parent] if parent >= 0 else waiting).append(joint)
-    waiting.reverse()
-    order = []
-    while waiting:
-        order.append(waiting.pop())
-        waiting += reversed(children[order[-1]])
-    return order

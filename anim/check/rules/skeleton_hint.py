@@ -7,15 +7,18 @@ from collections.abc import Iterator
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule
-from anim.check.rules.no_common_root import common_ancestors
+from anim.gltf.document import json_array
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the skins."""
-    for i, common in common_ancestors(file):
-        skin = file.json["skins"][i]
-        if common and "skeleton" in skin and skin["skeleton"] not in common:
-            yield file.in_skin(i, problem=f"skeleton names node {skin['skeleton']}, which is not above all joints")
+    for i, skin in enumerate(json_array(file.json, "skins")):
+        if "skeleton" not in skin or not file.have_common_root(skin["joints"]):
+            continue
+        first, end = file.subtrees
+        named, joints = skin["skeleton"], first[skin["joints"]]
+        if not ((first[named] <= joints) & (joints < end[named])).all():
+            yield file.in_skin(i, problem=f"skeleton names node {named}, which is not above all joints")
 
 
 RULE = Rule(

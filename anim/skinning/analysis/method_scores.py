@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
+from anim.maths.hierarchy import subtree_sums
 from anim.model import Clip, FrameChunk, Skeleton
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces
@@ -16,7 +17,6 @@ from anim.skinning.bake import Baker
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh
 from anim.skinning.methods.bulge_clamp import BoneSegments, bone_segments, clamp_positions
-from anim.skinning.weighted_joints import subtree_sums
 
 BULGE_RATIO = 1.05  # distance from the bones relative to bind pose, above which a vertex bulges
 MIN_DISTANCE_FRACTION = 0.25  # of the median distance: nearer vertices have no meaningful ratio

@@ -33,19 +33,27 @@ class BoneSegments:
 
 def bone_segments(rig: SkinBinding) -> BoneSegments:
     """Return the bones of a rig with the distances of its vertices."""
-    count = len(rig.nodes)
-    below = [np.flatnonzero(rig.ancestors == j) for j in range(count)]
-    tips = [each if len(each) else np.array([j]) for j, each in enumerate(below)]
-    start = np.cumsum([0, *map(len, tips)])
-    found = BoneSegments(
-        start, np.concatenate(tips), np.zeros(len(rig.points), np.float32), _blend_weight(rig), joint_origins(rig)
-    )
+    start, tips = bone_tips(rig.ancestors)
+    found = BoneSegments(start, tips, np.zeros(len(rig.points), np.float32), _blend_weight(rig), joint_origins(rig))
     points, at = rig.points[None].astype(np.float32), found.joints[None].astype(np.float32)
     squared = np.zeros((1, len(rig.points)), np.float32)
     from anim.skinning.kernels.bone_distance import squared_bone_distance
 
     squared_bone_distance(points, 0, rig.start, rig.joint, start, found.tips, at, squared)
     return BoneSegments(start, found.tips, np.sqrt(squared[0]), found.fraction, found.joints)
+
+
+def bone_tips(above: Ints) -> tuple[Ints, Ints]:
+    """Return the places (J + 1,) of joints in the list of their bones' far ends, and that list: children, or itself.
+
+    bone_tips([-1, 0, 0]) → [0, 2, 3, 4], [1, 2, 1, 2]
+    """
+    joints = np.arange(len(above))
+    leaves = np.setdiff1d(joints, above)
+    owners = np.concatenate((above[above >= 0], leaves))
+    tips = np.concatenate((joints[above >= 0], leaves))
+    start = np.concatenate(([0], np.cumsum(np.bincount(owners, minlength=len(above)))))
+    return start, tips[np.argsort(owners, kind="stable")]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Products along the paths of trees: sections of levels agree with one level after the other."""
+"""Subtrees, and products along the paths of trees: sections of levels agree with one level after the other."""
 
 from __future__ import annotations
 
@@ -50,3 +50,33 @@ def test_a_deep_tree_takes_few_steps() -> None:
     parents = np.arange(-1, count - 1)
     hierarchy.accumulate(np.ones((count, 1)), parents, list(np.arange(count)[:, None]), compose)
     assert calls <= 2 * 100
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_subtrees_of_random_trees(seed: int) -> None:
+    """Nodes in any order: a parent may come after those below it. Against a walk from each node to its root."""
+    random = np.random.default_rng(seed)
+    count = 30
+    parents = np.array([random.integers(-1, i) if i else -1 for i in range(count)])
+    new = random.permutation(count)
+    above = np.empty(count, np.int64)
+    above[new] = np.where(parents >= 0, new[parents], -1)
+    expected = np.zeros((count, count), bool)
+    for j in range(count):
+        at = above[j]
+        while at >= 0:
+            expected[at, j] = True
+            at = above[at]
+    first, end = hierarchy.find_subtrees(above)
+    found = (first[:, None] < first) & (first < end[:, None])
+    np.testing.assert_array_equal(found, expected)
+    values = random.random(count)
+    np.testing.assert_allclose(hierarchy.subtree_sums(above, values), values + expected @ values)
+
+
+def test_a_long_chain_takes_no_table_of_pairs() -> None:
+    """The square of 200 000 nodes would be 320 GB."""
+    count = 200_000
+    first, end = hierarchy.find_subtrees(np.arange(count) - 1)
+    assert first.tolist() == list(range(count))
+    assert (end == count).all()

@@ -8,7 +8,7 @@ import pytest
 from anim.gltf.reading import reader
 from anim.skinning.bake import bake
 from anim.skinning.binding import bind_skin
-from anim.skinning.methods.bulge_clamp import bone_segments
+from anim.skinning.methods.bulge_clamp import bone_segments, bone_tips
 from tests.anim.skinning.scenes import mesh, scene
 from tests.clips import about, clip, track
 from tests.files import opened_fixture
@@ -62,3 +62,24 @@ def test_scaled_joints_allow_more() -> None:
 def _nearest(points: np.ndarray) -> np.ndarray:
     """Nearest points of the lower link, from the foot to the middle; the upper joint's is its own place there."""
     return np.asarray(np.clip(points[:, 1:2], 0, 0.5) * [0, 1, 0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bones_of_random_trees(seed: int) -> None:
+    """Joints in any order, against a search of each joint's children."""
+    random = np.random.default_rng(seed)
+    order = random.permutation(20)
+    above = np.full(20, -1)
+    for i in range(1, 20):
+        above[order[i]] = order[random.integers(i)] if random.random() < 0.9 else -1
+    start, tips = bone_tips(above)
+    for joint in range(20):
+        below = np.flatnonzero(above == joint)
+        assert tips[start[joint] : start[joint + 1]].tolist() == (below.tolist() or [joint])
+
+
+def test_bones_of_a_long_chain_take_no_search_per_joint() -> None:
+    """Which would be 40 billion comparisons."""
+    start, tips = bone_tips(np.arange(200_000) - 1)
+    assert tips.tolist() == [*range(1, 200_000), 199_999]
+    assert start.tolist() == list(range(200_001))
