@@ -162,7 +162,7 @@ def _meters_per_unit(context: Context, animated: Iterable[int]) -> tuple[Floats,
     count = len(skeleton)
     reach = np.zeros(count)
     for node in animated:
-        mine = places[context.points.on(skeleton.descendants(node))]
+        mine = places[context.answering.of(node)]
         reach[node] = np.linalg.norm(mine - world[node, :, 3], axis=1).max(initial=0.0)
     lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max(axis=1)
     widening = np.where(skeleton.parents < 0, 1.0, lengths[skeleton.parents])

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Floats, Ints
 from anim.measure.error.orientation_probes import shell_points as shells_of
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Scene
@@ -90,14 +90,6 @@ class PointMatrix:
         """Return the positions of the points (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
         places = self._matrix @ stack_points(world, self.nodes)
         return np.swapaxes(places.reshape(len(self), 3, world.shape[1]), 1, 2)
-
-    def on(self, below: Bools) -> Bools:
-        """Return the mask (P,) of points with a noticeable weight on the nodes `below` (N,).
-
-        If no point has one, those with any weight.
-        """
-        share = (self.factors[..., 3] * below[self.nodes][self.joints]).sum(axis=1)
-        return np.asarray(share > CARRIED if (share > CARRIED).any() else share > 0)
 
 
 class PointRows:

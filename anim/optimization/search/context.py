@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from anim.measure.error.shell_points import nodes_without_vertices
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton, Track, parse_weight_pointer
 from anim.optimization.options import Bounds, Effort, Policy
+from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.tracks import morph_weights
 from anim.optimization.tracks.quantization import Encoding
 from anim.sampling.pose import rest_world
@@ -25,9 +26,8 @@ class Context:
     """The inputs of a clip's optimization, apart from the clip.
 
     size: m, the diagonal of the points' bounding box in the rest pose. rest_world: (N, 3, 4) world matrices of the rest
-    pose. surfaces: those with morph targets. answering: by index of a node that any clip animates, mask (P,) of the
-    points bound to it or its descendants. invisible: (N,) nodes that, with their descendants, carry no vertex; the node
-    of a skinned mesh is none.
+    pose. surfaces: those with morph targets. answering: the points bound to each node or its descendants. invisible:
+    (N,) nodes that, with their descendants, carry no vertex; the node of a skinned mesh is none.
     """
 
     skeleton: Skeleton
@@ -35,7 +35,7 @@ class Context:
     rest_world: Floats
     points: PointMatrix
     surfaces: tuple[Surface, ...]
-    answering: Mapping[int, Bools]
+    answering: AnsweringPoints
     invisible: Bools
     bounds: Bounds
     policy: Policy
@@ -89,7 +89,6 @@ def build_context(
         shells = {node for node in shells if node in policy.keep}
     world = rest_world(skeleton)
     points = points_.sample_points(scene, shells, bounds.shell, extra)
-    driven = sorted({track.node for clip in clips for track in clip.tracks if track.node is not None})
     places = points.places(world[:, None])[:, 0]
     return Context(
         skeleton,
@@ -97,7 +96,7 @@ def build_context(
         world,
         points,
         tuple(surface for surface in surfaces(scene) if len(surface.targets)),
-        {node: points.on(skeleton.descendants(node)) for node in driven},
+        AnsweringPoints(points, skeleton.parents),
         unseen,
         bounds,
         policy,

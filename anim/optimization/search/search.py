@@ -18,6 +18,7 @@ TARGET_USAGE = 0.97  # of the bound; target of the feedback
 FEEDBACK_EXPONENT = 0.6  # of target / usage, applied to budgets
 BUDGET_FACTOR_RANGE = (0.5, 1.8)  # limits of a budget's change per round
 SHRINK_FACTOR = 0.6
+MAX_TRACK_TRIALS = 500_000  # tracks × trials of a pass that changes one track at a time, about 5 s
 MAX_FORESEEN_USAGE = 1.05  # predicted bound usage up to which coarser storage is tried
 MAX_BUDGET_PER_BOUND = 4.0  # larger budgets save nothing more
 INT16_COARSENING = 1e3  # factor on the storage tolerance that selects integers
@@ -132,8 +133,8 @@ class _Search:
             self._attempt(plan)
 
     def _next_budgets(self, budgets: Floats, outcome: TrialResult) -> Floats:
-        answering = self._runner.source.answering
-        usage = np.where(answering, outcome.usage, 0.0).max(axis=1, initial=0.0)
+        source = self._runner.source
+        usage = source.answering.largest(outcome.usage, [each.node for each in source.moving])
         usage = np.maximum(usage, outcome.own)
         factor = np.clip((TARGET_USAGE / np.maximum(usage, 1e-9)) ** FEEDBACK_EXPONENT, *BUDGET_FACTOR_RANGE)
         gain = self._runner.leeway if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
@@ -160,7 +161,7 @@ class _Search:
         for _ in range(self._effort.coarsen_passes):
             before = self._best
             assert before is not None
-            for i in sorted(before.on, key=lambda i: -_length(self._best, i)):
+            for i in sorted(before.on, key=lambda i: -_length(self._best, i))[: self._max_single_trials]:
                 if self._may_be_coarser(i):
                     self._attempt(self._coarser(i, 2.0))
             if self._best is before:
@@ -170,7 +171,7 @@ class _Search:
         """Return whether twice the storage error is predicted to fit; the stored error is half its tolerance."""
         assert self._best is not None
         source = self._runner.source
-        used = float(self._best.usage[source.answering[track]].max(initial=0.0))
+        used = float(self._best.usage[source.answering.of(source.moving[track].node)].max(initial=0.0))
         gain = self._runner.leeway[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
         miss = self._best.keys[track].error
         return miss > 0 and used + miss * source.moving[track].meters / gain / 2 / self._bound < MAX_FORESEEN_USAGE
@@ -178,13 +179,18 @@ class _Search:
     def _store_coarser(self) -> None:
         """Try integers for each rotation stored as float32."""
         assert self._best is not None
-        for i, stored in sorted(self._best.keys.items()):
+        for i, stored in sorted(self._best.keys.items())[: self._max_single_trials]:
             if (
                 stored.form == "float32"
                 and len(stored.values) > quantization.MAX_FLOAT32_KEYS
                 and stored.values.shape[1] == 4
             ):
                 self._attempt(self._coarser(i, INT16_COARSENING))
+
+    @property
+    def _max_single_trials(self) -> int:
+        """Maximum number of trials in a pass that change one track each: a trial takes time for all tracks."""
+        return MAX_TRACK_TRIALS // max(len(self._runner.source.moving), 1)
 
     def _coarser(self, track: int, factor: float) -> Plan:
         assert self._best is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.model.time_axis import merge_times
 from anim.optimization.options import Reference
 from anim.optimization.search import playback
+from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.tracks.clip_ends import closure_sign
 from anim.sampling import PoseSampler, times
@@ -56,8 +57,8 @@ class SourceMotion:
     """A clip at its measurement times.
 
     grid: (K,) s, possible key times. at: (W,) s, the grid and times between. on_grid: (K,) indices of the grid in `at`.
-    moving: (G) tracks of the search. own: (G, K) mask of source keys, all for splines. answering: (G, P) mask of the
-    points that each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes.
+    moving: (G) tracks of the search. own: (G, K) mask of source keys, all for splines. answering: the points that the
+    node of each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes.
     points: on nodes that move in their parents' space, or are roots. levels: of these nodes. columns: (4 J, 3 W) world
     matrices of the points' nodes; by_chord: the same with nlerp.
     """
@@ -67,7 +68,7 @@ class SourceMotion:
     on_grid: Ints
     moving: tuple[SourceTrack, ...]
     own: Bools
-    answering: Bools
+    answering: AnsweringPoints
     local: tuple[Floats, Floats, Floats]
     points: PointMatrix
     levels: tuple[Ints, ...]
@@ -80,15 +81,15 @@ def analyze_source(
     clip: Clip,
     free: Sequence[int],
     points: PointMatrix,
-    below: Mapping[int, Bools],
+    answering: AnsweringPoints,
     *,
     reference: Reference,
     chord_tolerance: float,
 ) -> SourceMotion:
     """Return the source motion of `clip` on `points`; only the tracks with indices in `free` may change.
 
-    below: by index of a free track's node, mask (P,) of the points bound to it or its descendants. chord_tolerance: m;
-    slerp and nlerp, or both ends of a track, count as equal if closer.
+    answering: the points bound to a node or its descendants. chord_tolerance: m; slerp and nlerp, or both ends of a
+    track, count as equal if closer.
     """
     tracks = [clip.tracks[i] for i in free]
     grid = key_grid(tracks)
@@ -99,10 +100,9 @@ def analyze_source(
     levels = required_levels(skeleton, points.nodes)
     world = matrix.accumulate_world(matrices, skeleton.parents, list(levels))
     nodes = {track.node for track in tracks if track.node is not None}
-    reach = _influence_radius(world, points, {node: below[node] for node in nodes})
+    reach = _influence_radius(world, points, answering, nodes)
     widening = _widening(skeleton, world, levels)
     moving = _source_tracks(clip, free, skeleton, local, reach, widening, chord_tolerance)
-    answering = np.array([below[each.node] for each in moving]).reshape(len(moving), len(points))
     points = _on_moving_nodes(points, skeleton, matrices, levels, nodes)
     levels = required_levels(skeleton, points.nodes)
     columns = stack_points(world, points.nodes)
@@ -226,13 +226,15 @@ def farthest(values: Floats, points: Floats) -> Floats:
     return np.asarray(np.einsum("gwc,gwc->gw", apart, apart).max(axis=1, initial=0.0))
 
 
-def _influence_radius(world: Floats, points: PointMatrix, answering: dict[int, Bools]) -> dict[int, float]:
+def _influence_radius(
+    world: Floats, points: PointMatrix, answering: AnsweringPoints, nodes: Set[int]
+) -> dict[int, float]:
     """For each node, the largest distance of the points it moves, in metres."""
     frames = world[:, :: max(1, -(-world.shape[1] // PROBE_FRAMES))]
     places = np.swapaxes(points.places(frames), 1, 2)  # (P, 3, F)
     found = {}
-    for node, mine in answering.items():
-        away = places[mine] - frames[node, :, :, 3].T
+    for node in nodes:
+        away = places[answering.of(node)] - frames[node, :, :, 3].T
         away *= away
         found[node] = math.sqrt((away[:, 0] + away[:, 1] + away[:, 2]).max(initial=0.0))
     return found

@@ -10,6 +10,7 @@ from anim.arrays import Floats
 from anim.measure.error.point_matrix import PointMatrix, sample_points
 from anim.model import Clip, Scene
 from anim.optimization.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
+from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.source_motion import SourceMotion, analyze_source
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
@@ -55,9 +56,7 @@ def every_point(of: Scene) -> PointMatrix:
 
 def truth_of(of: Scene, what: Clip, points: PointMatrix, reference: Reference = Reference.CURVE) -> SourceMotion:
     """What a clip does to points, all of its tracks free."""
-    below = {
-        track.node: points.on(of.skeleton.descendants(track.node)) for track in what.tracks if track.node is not None
-    }
+    below = AnsweringPoints(points, of.skeleton.parents)
     return analyze_source(
         of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, chord_tolerance=1e-6
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -122,16 +120,6 @@ def test_morphed_as_at_rest() -> None:
     of = made(mesh([[1.0, 0, 0]], [[0]], [[1.0]], targets=[[[0, 2.0, 0]]], rest_weights=[0.5]), [-1])
     world = np.tile(np.eye(4)[:3], (2, 1, 1, 1))
     assert every_point(of).places(world)[0, 0] == pytest.approx([1, 1, 0])
-
-
-def test_points_answer_for_what_they_noticeably_hang_on() -> None:
-    one = PointMatrix(np.array([2, 7]), np.array([[0, 1], [1, 0]]), np.ones((2, 2, 4)) * [[[0.95], [0.05]]])
-    nodes = np.zeros(9, np.bool_)
-    nodes[2] = True
-    assert one.on(nodes).tolist() == [True, False]
-    faint = replace(one, factors=0.1 * one.factors)
-    assert faint.on(nodes).tolist() == [True, True]  # where none hangs on it noticeably: all that do at all
-    assert not one.on(np.zeros(9, np.bool_)).any()
 
 
 def test_distinct_points_are_the_first_of_each_label() -> None:

@@ -117,7 +117,7 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
     source = truth_of(of, what, points)
     rng = np.random.default_rng(seed)
     before = source.points.places(level_world_matrices(of.skeleton, source.local, source.levels))
-    for g, each in enumerate(source.moving):
+    for each in source.moving:
         local = tuple(part.copy() for part in source.local)
         change = 1e-4 * rng.normal(size=each.values.shape)
         changed = each.values + change
@@ -128,7 +128,7 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
         after = source.points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), source.levels))
         moved = np.linalg.norm(after - before, axis=2)
         allowed = each.meters * np.linalg.norm(change, axis=1).max()
-        assert moved[source.answering[g]].max(initial=0.0) <= slack * allowed
+        assert moved[source.answering.of(each.node)].max(initial=0.0) <= slack * allowed
         assert moved.max() > 0.05 * allowed  # and it says no more than it must
 
 

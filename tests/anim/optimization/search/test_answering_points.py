@@ -1,0 +1,64 @@
+"""Points that nodes move, against a mask of all points for each node."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anim.arrays import Floats, Ints
+from anim.measure.error.point_matrix import CARRIED, PointMatrix
+from anim.optimization.search import answering_points
+from anim.optimization.search.answering_points import AnsweringPoints
+
+NODES, POINTS = 12, 60
+
+
+def random_case(seed: int, width: int) -> tuple[PointMatrix, Ints]:
+    random = np.random.default_rng(seed)
+    order = random.permutation(NODES)
+    parents = np.full(NODES, -1)
+    for i in range(1, NODES):
+        parents[order[i]] = order[random.integers(i)] if random.random() < 0.9 else -1
+    factors = random.normal(size=(POINTS, width, 4))
+    weights = random.random((POINTS, width)) ** 4
+    factors[..., 3] = weights / weights.sum(axis=1, keepdims=True)
+    nodes = np.sort(random.choice(NODES, NODES - 3, replace=False))
+    return PointMatrix(nodes, random.integers(len(nodes), size=(POINTS, width)), factors), parents
+
+
+def points_on(points: PointMatrix, parents: Ints, node: int) -> list[int]:
+    below = np.arange(NODES) == node
+    for _ in range(NODES):
+        below |= (parents >= 0) & below[parents]
+    share = (points.factors[..., 3] * below[points.nodes][points.joints]).sum(axis=1)
+    return np.flatnonzero(share > CARRIED if (share > CARRIED).any() else share > 0).tolist()
+
+
+@pytest.mark.parametrize("kept", [0, 40, answering_points.MAX_KEPT])
+@pytest.mark.parametrize("width", [1, 4])
+@pytest.mark.parametrize("seed", range(4))
+def test_points_of_every_node(seed: int, width: int, kept: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where few of them are stored."""
+    monkeypatch.setattr(answering_points, "MAX_KEPT", kept)
+    points, parents = random_case(seed, width)
+    found = AnsweringPoints(points, parents)
+    values: Floats = np.random.default_rng(seed).random(POINTS)
+    for _ in range(2):
+        expected = [points_on(points, parents, node) for node in range(NODES)]
+        assert [sorted(found.of(node).tolist()) for node in range(NODES)] == expected
+        most = [values[each].max(initial=0) for each in expected]
+        assert found.largest(values, range(NODES)).tolist() == most
+
+
+def test_no_points() -> None:
+    none = PointMatrix(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
+    assert AnsweringPoints(none, np.array([-1, 0])).of(0).tolist() == []
+
+
+def test_points_answer_for_what_they_noticeably_hang_on() -> None:
+    parents = np.array([-1, 0, 1, 1, 0, 0, 0, 0, 0])
+    one = PointMatrix(np.array([2, 7]), np.array([[0, 1], [1, 0]]), np.ones((2, 2, 4)) * [[[0.95], [0.05]]])
+    assert AnsweringPoints(one, parents).of(2).tolist() == [0]
+    faint = PointMatrix(one.nodes, one.joints, 0.1 * one.factors)
+    assert AnsweringPoints(faint, parents).of(2).tolist() == [0, 1]  # where none hangs on it noticeably
+    assert AnsweringPoints(one, parents).of(3).tolist() == []
