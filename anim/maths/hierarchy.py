@@ -25,9 +25,12 @@ def accumulate(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Co
     of the parents' products (M, ...) and the nodes' own values (M, ...).
     accumulate([2, 3, 5], [-1, 0, 1], [[0], [1], [2]], np.multiply) → [2, 6, 30]
     """
-    if len(levels) < MIN_DEPTH or len(parents) > MAX_WIDTH * len(levels):
-        return _by_level(local, parents, levels, compose)
-    return _by_section(local, parents, levels, compose)
+    return (_by_section if is_deep(levels) else _by_level)(local, parents, levels, compose)
+
+
+def is_deep(levels: Sequence[Ints]) -> bool:
+    """Return whether a tree is deep and thin, so that a step per level would take long for its number of nodes."""
+    return len(levels) >= MIN_DEPTH and sum(map(len, levels)) <= MAX_WIDTH * len(levels)
 
 
 def find_subtrees(parents: Ints) -> tuple[Ints, Ints]:

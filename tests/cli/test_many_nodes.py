@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from anim.measure.continuous_bound import node_bounds
+from anim.measure.continuous_bound.prover import Prover
 from tests import many
 from tests.cli.conftest import Call
 from tests.cli.test_many import LIMIT, work
@@ -22,3 +25,26 @@ def test_work_grows_with_the_count(make: many.Make, count: int, command: str, ca
         (tmp_path / f"{number}.glb").write_bytes(make(number))
         taken.append(work(call, command, tmp_path / f"{number}.glb"))
     assert taken[1] < LIMIT * taken[0]
+
+
+def test_a_deep_chain_of_moving_nodes_is_sampled_and_bounded_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More samples would prove nothing there; bounds take few steps, not one per level."""
+    counted = {"certified": 0, "product": 0}
+
+    def count(owner: object, name: str) -> None:
+        function = getattr(owner, name)
+
+        def called(*args: Any, **options: Any) -> Any:
+            counted[name] += 1
+            return function(*args, **options)
+
+        monkeypatch.setattr(owner, name, called)
+
+    count(Prover, "certified")
+    count(node_bounds, "product")
+    (tmp_path / "in.glb").write_bytes(many.chain_open(600))
+    call("resample", tmp_path / "in.glb", tmp_path / "out.glb", "--fps", "5").product()
+    assert counted["certified"] == 1
+    assert counted["product"] < 600

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.maths import hierarchy
 from anim.measure.continuous_bound.derivative_bounds import product, resting
 from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
 from anim.measure.continuous_bound.intervals import Intervals
 from anim.measure.continuous_bound.rotation_bounds import rotation_bounds
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
 from anim.measure.continuous_bound.track_partition import ClipVersion, pick_tracks
+from anim.model import Skeleton
 from anim.sampling.batch import Batch
 
 UNIT_TOLERANCE = 1e-6  # of |q|²: up to this, players with and without normalization agree
@@ -37,6 +39,8 @@ def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, p
     Both versions have the same hierarchy. players: names in PLAYERS.
     """
     local = local_bounds(first, second, where, players=players)
+    if hierarchy.is_deep(first.skeleton.levels()):
+        return _world_of_deep(local, first.skeleton)
     matrices, origins = np.empty_like(local.matrices), np.empty_like(local.origins)
     jumps = np.zeros((2, *local.jumps.shape[1:]))
     has_jumps = bool(local.jumps.any())
@@ -53,6 +57,32 @@ def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, p
             jumps[0, nodes] = jumps[0, above] * (own[0, 1] + leap) + parent[0, 1] * leap
             jumps[1, nodes] = jumps[1, above] + jumps[0, above] * origin[0, 1]
     return NodeBounds(matrices, origins, jumps)
+
+
+def _world_of_deep(local: NodeBounds, skeleton: Skeleton) -> NodeBounds:
+    """The same in few steps: majorants of paths are products of those of their parts."""
+    count, intervals = local.matrices.shape[2:]
+    rows = [np.moveaxis(each, 2, 0).reshape(count, 6, intervals) for each in (local.matrices, local.origins)]
+    parts = np.concatenate((*rows, local.jumps[0][:, None], np.zeros((count, 1, intervals))), axis=1)
+    found = hierarchy.accumulate(parts, skeleton.parents, skeleton.levels(), _join_paths)
+    return NodeBounds(_majorants(found, 0), _majorants(found, 6), np.moveaxis(found[:, 12:], 1, 0))
+
+
+def _join_paths(above: Floats, below: Floats) -> Floats:
+    """Majorants (M, 14, G) of matrix (6), origin (6), and their jumps, of two paths one after the other."""
+    parent, own, origin = _majorants(above, 0), _majorants(below, 0), _majorants(below, 6)
+    jump, leap = above[:, 12], below[:, 12]
+    found = np.empty(above.shape)
+    found[:, :6] = np.moveaxis(product(parent, own), 2, 0).reshape(len(found), 6, -1)
+    found[:, 6:12] = above[:, 6:12] + np.moveaxis(product(parent, origin), 2, 0).reshape(len(found), 6, -1)
+    found[:, 12] = jump * (own[0, 1] + leap) + parent[0, 1] * leap
+    found[:, 13] = above[:, 13] + jump * origin[0, 1] + (parent[0, 1] + jump) * below[:, 13]
+    return found
+
+
+def _majorants(parts: Floats, at: int) -> Floats:
+    """Six rows of parts (M, 14, G) as majorants (3, 2, M, G)."""
+    return np.moveaxis(parts[:, at : at + 6].reshape(len(parts), 3, 2, -1), 0, 2)
 
 
 def local_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:

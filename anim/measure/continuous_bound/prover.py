@@ -48,7 +48,10 @@ class ProofTarget:
 
 
 class Prover:
-    """Prover of bounds for clips on the scenes of a metric: prepares what all clips share."""
+    """Prover of bounds for clips on the scenes of a metric: prepares what all clips share.
+
+    is_refined: whether samples between times can prove more; not of skeletons with hundreds of levels.
+    """
 
     def __init__(self, ruler: ErrorMetric) -> None:
         self.ruler = ruler
@@ -59,7 +62,7 @@ class Prover:
         a, b = ruler.skeletons
         same = np.array_equal(a.parents, b.parents) and np.array_equal(a.sheared, b.sheared)
         self._knows_all = same and len(self._parts) == len(found)
-        self._is_refined = len(a.levels()) <= MAX_REFINED_DEPTH
+        self.is_refined = len(a.levels()) <= MAX_REFINED_DEPTH
 
     def certified(
         self,
@@ -123,7 +126,7 @@ class Prover:
         for player, each in limits.items():
             tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise
             is_open = tops > aim.found + aim.slack
-            is_open &= self._is_refined
+            is_open &= self.is_refined
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
                 parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.slack))

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.arrays import Floats
+from anim.maths import hierarchy
 from anim.measure.continuous_bound.intervals import Intervals, merge_intervals
 from anim.measure.continuous_bound.node_bounds import local_bounds, world_bounds
 from anim.measure.continuous_bound.track_partition import partition_tracks
@@ -74,3 +75,22 @@ def test_a_jump_is_bounded_exactly() -> None:
     assert jumps[0, 0, 0] == pytest.approx(2 * 2 * (1.001**2 - 1))  # of both versions
     assert np.linalg.norm((after - before)[1, :, 3]) <= jumps[1, 1, 0] / 2 <= 3.01 * 2 * (1.001**2 - 1)
     assert not jumps[:, :, 1].any()
+
+
+def test_deep_trees_have_the_bounds_of_a_step_per_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines, STEP and keys that are too long, which jump; a trunk with branches."""
+    parents = [*range(-1, 299), 5, *range(300, 320)]
+    of = Scene(skeleton(parents, translation=np.tile([0.01, 0.02, 0], (len(parents), 1))), ())
+    random = np.random.default_rng(0)
+    times = np.array([0, 0.02, 0.04])
+    versions = []
+    for length in (1.0, 1.0001):
+        turns = [about("z", 0.1 * random.normal(size=3)) * [[1], [length], [1]] for _ in parents]
+        versions.append(clip(*(track("rotation", times, keys, node=i) for i, keys in enumerate(turns))))
+    tracks = partition_tracks((of, of), (versions[0], versions[1]))
+    found = world_bounds(*tracks, Intervals(times), players=["three"])
+    monkeypatch.setattr(hierarchy, "MIN_DEPTH", 1000)
+    expected = world_bounds(*tracks, Intervals(times), players=["three"])
+    assert expected.jumps.any()
+    for name in ("matrices", "origins", "jumps"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-10)
