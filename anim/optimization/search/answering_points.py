@@ -10,7 +10,7 @@ from anim.arrays import Floats, Ints
 from anim.maths.hierarchy import find_subtrees
 from anim.measure.error.point_matrix import CARRIED, PointMatrix
 
-MAX_KEPT = 10_000_000  # indices of points that are stored; those of further nodes are found again each time
+MAX_CACHED = 10_000_000  # indices of points that are cached; those of further nodes are found again each time
 
 
 class AnsweringPoints:
@@ -24,17 +24,17 @@ class AnsweringPoints:
         entries = self._joint.reshape(-1)
         order = np.argsort(entries, kind="stable")
         self._sorted, self._point = entries[order], order // max(self._joint.shape[1], 1)
-        self._kept: dict[int, Ints] = {}
-        self._room = MAX_KEPT
+        self._cached: dict[int, Ints] = {}
+        self._room = MAX_CACHED
 
     def of(self, node: int) -> Ints:
         """Return the indices of a node's points, in any order, each once."""
-        if node in self._kept:
-            return self._kept[node]
+        if node in self._cached:
+            return self._cached[node]
         found = self._find(int(self._first[node]), int(self._end[node]))
         if len(found) <= self._room:
             self._room -= len(found)
-            self._kept[node] = found
+            self._cached[node] = found
         return found
 
     def largest(self, values: Floats, nodes: Sequence[int]) -> Floats:

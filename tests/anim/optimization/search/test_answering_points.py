@@ -34,12 +34,12 @@ def points_on(points: PointMatrix, parents: Ints, node: int) -> list[int]:
     return np.flatnonzero(share > CARRIED if (share > CARRIED).any() else share > 0).tolist()
 
 
-@pytest.mark.parametrize("kept", [0, 40, answering_points.MAX_KEPT])
+@pytest.mark.parametrize("cached", [0, 40, answering_points.MAX_CACHED])
 @pytest.mark.parametrize("width", [1, 4])
 @pytest.mark.parametrize("seed", range(4))
-def test_points_of_every_node(seed: int, width: int, kept: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_points_of_every_node(seed: int, width: int, cached: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where few of them are stored."""
-    monkeypatch.setattr(answering_points, "MAX_KEPT", kept)
+    monkeypatch.setattr(answering_points, "MAX_CACHED", cached)
     points, parents = random_case(seed, width)
     found = AnsweringPoints(points, parents)
     values: Floats = np.random.default_rng(seed).random(POINTS)
