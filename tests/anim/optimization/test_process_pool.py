@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import pickle
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -76,6 +78,57 @@ def test_a_script_without_a_main_guard_gets_an_error_that_names_it(tmp_path: Pat
     assert '`if __name__ == "__main__":`' in run.stdout
 
 
+def _killed(shared: None, task: bytes) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+LARGE_KILLED = """
+from anim.errors import AnimError
+from anim.optimization.process_pool import process_pool
+from tests.anim.optimization.test_process_pool import _killed
+
+if __name__ == "__main__":
+    try:
+        with process_pool(2, None) as pool:
+            list(pool.each(_killed, [bytes(1_000_000)] * 8, label=lambda task: "clip"))
+    except AnimError as error:
+        print(error)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
+def test_killed_processes_leave_no_pipe_that_waits(tmp_path: Path) -> None:
+    """Before Python 3.11.4, the thread that sent the next megabyte waited for a reader for ever."""
+    script = tmp_path / "killed.py"
+    script.write_text(LARGE_KILLED)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60, env=environment)
+    assert "ended by the system" in run.stdout, run.stderr
+
+
+def test_what_goes_through_pipes_is_small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A process that is killed while it sends a large result would stop all others, and the parent with them."""
+    monkeypatch.setattr(module, "_run_in_worker", [bytes(1_000_000)])
+    sizes: list[int] = []
+
+    class Pipes(_Serial):
+        def submit(self, function: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+            future = super().submit(function, *given, **named)
+            sizes.append(max(len(pickle.dumps((function, given, named))), len(pickle.dumps(future.result()))))
+            return future
+
+    pool = ProcessPool(Pipes(), bytes(1_000_000), tmp_path)
+    found = list(pool.each(_joined, [bytes(1_000_000)] * 3, label=str))
+    assert [len(each) for each in found] == [2_000_000] * 3
+    assert len(sizes) == 4
+    assert max(sizes) < 4096
+    assert not list(tmp_path.iterdir())  # files are removed as they are read
+
+
+def _joined(shared: bytes, task: bytes) -> bytes:
+    return shared + task
+
+
 class _Serial(Executor):
     """Runs at once what is submitted."""
 
@@ -85,10 +138,10 @@ class _Serial(Executor):
         return future
 
 
-def test_the_most_work_starts_first_and_results_keep_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_most_work_starts_first_and_results_keep_the_order(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     started: list[int] = []
     monkeypatch.setattr(module, "_run_in_worker", [None])
-    pool = ProcessPool(_Serial(), None)
+    pool = ProcessPool(_Serial(), None, tmp_path)
 
     def run(_: object, task: int) -> int:
         started.append(task)
