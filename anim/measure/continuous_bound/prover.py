@@ -12,13 +12,12 @@ from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import influence_radius
 from anim.measure.continuous_bound.interval_rise import interval_rise
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
-from anim.measure.continuous_bound.refinement import RefinedMaximum, refine, subdivide
+from anim.measure.continuous_bound.refinement import OpenIntervals, RefinedMaximum, refine
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
 from anim.model import Clip, Scene
 from anim.sampling.players import PLAYERS
 
 BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is not refined
-MAX_PARTS = 128  # maximum number of subintervals between two times
 MAX_REFINED_DEPTH = 256  # levels of the metric's skeletons; bounds of deeper ones are too loose for any samples
 PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # players with normalized arcs are adjacent
 LARGE_SKELETON = 1000  # moving nodes; from here on a step is LARGE_STEP_FRACTION as long, for memory
@@ -41,10 +40,15 @@ class Proof:
 
 @dataclass(frozen=True, slots=True)
 class ProofTarget:
-    """Target of a proof. found: m, largest distance so far. room: m, largest excess of the bound over it."""
+    """Target of a proof. found: m, largest distance so far. slack: m, largest excess of the bound over it."""
 
     found: float
     slack: float
+
+    @property
+    def most(self) -> float:
+        """The largest bound in m that needs no refinement."""
+        return self.found + self.slack
 
 
 class Prover:
@@ -97,7 +101,7 @@ class Prover:
             stretch = slice(start, start + self._length(len(look.limits)) + 1)
             limits = _limits(look.limits, self._order, stretch)
             closed, other = self._proven((before, after), times[stretch], limits, aim, longest)
-            bound = max(bound, closed, other.bound)
+            bound = max(bound, closed)
             seen = max(seen, other, key=lambda each: each.largest)
         if seen.largest > worst.max_error:
             found = self.ruler.error_at(before, after, np.array([seen.time]), player=seen.player)
@@ -122,17 +126,39 @@ class Prover:
         risen = interval_rise(
             (one, other), self.ruler.clips(*clips), times, self._reaches, list(limits), longest=longest
         )
-        closed, asked = 0.0, []
+        closed, opened = 0.0, []
         for player, each in limits.items():
-            tops = np.maximum(each[:, :-1], each[:, 1:] + risen.jump) + risen.rise
-            is_open = tops > aim.found + aim.slack
-            is_open &= self.is_refined
+            ends = each[:, :-1], each[:, 1:] + risen.jump
+            tops = np.maximum(*ends) + risen.rise
+            is_open = (tops > aim.most) & self.is_refined
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
-                parts = np.ceil(np.sqrt(np.where(is_open, risen.rise, 0.0).max(axis=0) / aim.slack))
-                finest = np.clip(parts, 1, MAX_PARTS).astype(np.int64)
-                asked.append(subdivide(player, times, risen.rise, is_open, finest))
-        return closed, refine(self.ruler, clips, asked, self._parts, target=aim.found + aim.slack)
+                opened.append(OpenIntervals(player, ends, risen.rise, is_open))
+        refined, seen = self._refined(clips, times, opened, aim)
+        return max(closed, refined), seen
+
+    def _refined(
+        self, clips: tuple[Clip, Clip], times: Floats, opened: Sequence[OpenIntervals], aim: ProofTarget
+    ) -> tuple[float, RefinedMaximum]:
+        """The bound of open intervals of all players, and the largest displacement sampled in them.
+
+        They are divided into as many parts as it takes if displacements within are not larger than at both ends; then,
+        where they are, into as many as it takes in any case. All players have the same parts, to share what they can.
+        """
+        bound, seen = 0.0, RefinedMaximum()
+        for is_last in (False, True):
+            opened = [each for each in opened if each.is_open.any()]
+            if not opened:
+                break
+            finest = np.maximum.reduce([each.num_parts(aim.slack) for each in opened])
+            rooms = [aim.slack if is_last else each.room(aim.most, aim.slack) for each in opened]
+            parts = np.maximum.reduce([each.num_parts(room) for each, room in zip(opened, rooms, strict=True)])
+            asked, edges = zip(*(each.subdivide(times, parts, aim.most) for each in opened), strict=True)
+            found = refine(self.ruler, clips, asked, self._parts, target=aim.most)
+            seen = max(seen, found, key=lambda each: each.largest)
+            inner = [each.close(some, aim.most, parts < finest) for each, some in zip(opened, asked, strict=True)]
+            bound = max(bound, *edges, *inner)
+        return bound, seen
 
 
 def _limits(
