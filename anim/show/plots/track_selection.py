@@ -198,7 +198,8 @@ def _morph_targets(document: Document) -> dict[str, tuple[str, ...]]:
     """Names of morph targets by the pointer to their weights, from `extras.targetNames` of meshes."""
     result: dict[str, tuple[str, ...]] = {}
     for i, mesh in enumerate(json_array(document.json, "meshes")):
-        names = _target_names(mesh) or _target_names(mesh["primitives"][0])
+        primitives = mesh["primitives"][:1]  # none in an invalid file, whose curves can be drawn nevertheless
+        names = next(filter(None, map(_target_names, [mesh, *primitives])), ())
         if names:
             result[f"/meshes/{i}/weights"] = names
     for i, node in enumerate(json_array(document.json, "nodes")):
