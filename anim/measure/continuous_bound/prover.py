@@ -151,8 +151,8 @@ class Prover:
             if not opened:
                 break
             finest = np.maximum.reduce([each.num_parts(aim.slack) for each in opened])
-            rooms = [aim.slack if is_last else each.room(aim.most, aim.slack) for each in opened]
-            parts = np.maximum.reduce([each.num_parts(room) for each, room in zip(opened, rooms, strict=True)])
+            margins = [aim.slack if is_last else each.margin(aim.most, aim.slack) for each in opened]
+            parts = np.maximum.reduce([each.num_parts(margin) for each, margin in zip(opened, margins, strict=True)])
             asked, edges = zip(*(each.subdivide(times, parts, aim.most) for each in opened), strict=True)
             found = refine(self.ruler, clips, asked, self._parts, target=aim.most)
             seen = max(seen, found, key=lambda each: each.largest)

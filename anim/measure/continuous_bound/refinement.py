@@ -60,12 +60,12 @@ class OpenIntervals:
     rise: Floats
     is_open: Bools
 
-    def num_parts(self, room: Floats | float) -> Ints:
-        """Return the number of parts (F − 1,) in which no displacement rises more than `room` (C, F − 1) m."""
-        rises = np.where(self.is_open, self.rise / room, 0.0).max(axis=0)
+    def num_parts(self, margin: Floats | float) -> Ints:
+        """Return the number of parts (F − 1,) in which no displacement rises more than `margin` (C, F − 1) m."""
+        rises = np.where(self.is_open, self.rise / margin, 0.0).max(axis=0)
         return np.asarray(np.clip(np.ceil(np.sqrt(rises)), 1, MAX_PARTS), np.int64)
 
-    def room(self, target: float, least: float) -> Floats:
+    def margin(self, target: float, least: float) -> Floats:
         """Return how much displacements (C, F − 1) may rise above both ends until they reach the target, in m."""
         return np.maximum(target - np.maximum(*self.ends), least)
 

@@ -18,6 +18,7 @@ from anim.optimization.search import playback
 from anim.optimization.search.candidates import Candidate, Candidates
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
 from anim.optimization.search.plan import Plan, RotationTarget, TrackAction, TrialResult
+from anim.optimization.search.size_estimate import SizeEstimate
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion, farthest
 from anim.optimization.search.time_axes import SharedAxis, TimeAxisSearch
 from anim.optimization.tracks import quantization
@@ -51,7 +52,7 @@ class TrialRunner:
         self.source = source
         self._skeleton = skeleton
         self._usage = usage
-        self._coding = coding
+        self._sizes = SizeEstimate(source, coding)
         self._droppable = droppable
         self._bound = usage.bounds.max_error
         self._nodes = np.array([each.node for each in source.moving], np.int64)
@@ -77,17 +78,19 @@ class TrialRunner:
     def run_smaller(self, plan: Plan, limit: float, *, smaller_than: float = math.inf) -> TrialResult | None:
         """Return the same; None, without a measurement, for a result with `limit` or more bytes."""
         actions = self._actions(plan)
-        shown = [part.copy() for part in self.source.local]
-        keys = self._single_key(actions, plan, shown)
         axes = self._layouts.axes(plan.axes, np.flatnonzero(actions == TrackAction.KEYED), plan.budgets)
         tolerances = (
             QUANTIZATION_BUDGET_FRACTION * plan.budgets * plan.coarser / np.maximum(self._meters, 1e-30)
         ).tolist()
+        if self._sizes.min_size(actions, axes, tolerances) >= limit:
+            return None
+        shown = [part.copy() for part in self.source.local]
+        keys = self._single_key(actions, plan, shown)
         for i, candidate in self._key_candidates(plan.rotation_target, axes, tolerances, shown[ROTATION]):
             keys[i] = candidate.stored
             shown[self._paths[i]][self._nodes[i]] = candidate.shown
         on = {i: axis.keys for axis in axes for i in axis.members}
-        size = self._size(actions, keys, axes)
+        size = self._sizes.size(actions, keys, axes)
         if size >= limit:
             return None
         usage = self._usage
@@ -158,18 +161,6 @@ class TrialRunner:
                 mixed = self._candidates.by_chords(axis, [keys[i] for i in members])
                 shown[ROTATION][self._nodes[members]] = np.swapaxes(mixed, 0, 1)
         return self._usage.nlerp(shown)
-
-    def _size(self, actions: Ints, keys: dict[int, EncodedKeys], axes: list[SharedAxis]) -> float:
-        prices = self._coding.byte_costs
-        moving = {(n, keys[i].name): keys[i] for n, axis in enumerate(axes) for i in axis.members}
-        repeated = (actions == TrackAction.KEYED).sum() - len(moving)
-        text = (
-            prices.track * len(moving)
-            + prices.repeated * repeated
-            + prices.single_key * (actions == TrackAction.CONSTANT).sum()
-        )
-        times = sum(prices.axis + self._coding.time_bytes * axis.keys.sum() for axis in axes)
-        return float(text + times + self._coding.size(list(moving.values())))
 
 
 def _rest(source: SourceMotion, path: str) -> Floats:

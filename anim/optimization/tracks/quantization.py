@@ -12,6 +12,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.gltf.meshopt import codec, storage
+from anim.model.track import NUM_COMPONENTS
 from anim.optimization.options import Objective, Packing
 
 MAX_INT16 = 32767.0
@@ -75,6 +76,12 @@ class Encoding:
             return compressed_size(list(streams.values()), self.packing)
         return sum(each.values.size * (2 if each.form == "int16" else 4) for each in keys)
 
+    def min_size(self, count: int, path: str, tolerance: float) -> float:
+        """Return the bytes that a number of keys takes at least, with an error up to `tolerance` in their units."""
+        if self.packing is not Packing.CORE:
+            return 0.0
+        return count * (4 * 2 if is_int16(path, tolerance, count) else 4 * NUM_COMPONENTS[path])
+
 
 @dataclass(frozen=True, slots=True)
 class EncodedKeys:
@@ -110,14 +117,15 @@ class EncodedKeys:
 def choose_format(values: Floats, path: str, tolerance: float, packing: Packing) -> Form:
     """Return the smallest format for keys (K, C) with an error up to about `tolerance`, in their units."""
     if packing is Packing.CORE:
-        return (
-            ("int16", 0)
-            if path == "rotation" and tolerance >= MIN_INT16_ERROR and len(values) > MAX_FLOAT32_KEYS
-            else ("float32", 0)
-        )
+        return ("int16", 0) if is_int16(path, tolerance, len(values)) else ("float32", 0)
     if path == "rotation" and tolerance >= MIN_FILTER_ERROR:
         return "quaternion", filter_bits(tolerance)
     return "exponent", exponent(values, tolerance)
+
+
+def is_int16(path: str, tolerance: float, count: int) -> bool:
+    """Return whether a number of keys is stored as int16 in core glTF."""
+    return path == "rotation" and tolerance >= MIN_INT16_ERROR and count > MAX_FLOAT32_KEYS
 
 
 def encode(values: Floats, form: Form) -> EncodedKeys:

@@ -103,8 +103,8 @@ def test_ends_far_below_the_target_are_not_sampled_again() -> None:
     """A rise of 8 above 1 at the start and 6 at the end: by 2 in two parts, by 8/9 in three."""
     ends = np.array([[1.0, 0]]), np.array([[6.0, 0]])
     intervals = OpenIntervals("spec", ends, np.array([[8.0, 9]]), np.array([[True, False]]))
-    assert intervals.room(7.0, 0.5).tolist() == [[1.0, 7.0]]
-    assert intervals.num_parts(intervals.room(7.0, 0.5)).tolist() == [3, 1]
+    assert intervals.margin(7.0, 0.5).tolist() == [[1.0, 7.0]]
+    assert intervals.num_parts(intervals.margin(7.0, 0.5)).tolist() == [3, 1]
     assert intervals.num_parts(0.5).tolist() == [4, 1]
     found, bound = intervals.subdivide(np.array([0.0, 6, 7]), np.array([3, 1]), 7.0)
     assert found.times.tolist() == [2, 4]

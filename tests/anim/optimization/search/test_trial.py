@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +16,10 @@ from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Clip, Scene
 from anim.optimization.options import Bounds
 from anim.optimization.search import time_axes
+from anim.optimization.search.candidates import Candidates
 from anim.optimization.search.plan import Plan, TrackAction, TrialResult
 from anim.optimization.search.source_motion import SourceMotion
-from anim.optimization.search.time_axes import LAYOUTS
+from anim.optimization.search.time_axes import LAYOUTS, SharedAxis
 from anim.optimization.search.trial import BoundUsage, TrialRunner
 from anim.sampling import sample_pose
 from tests.anim.optimization.making import CORE, every_point, scene, truth_of, turning, waving
@@ -152,6 +154,30 @@ def test_tracks_stored_alike_count_once() -> None:
     pair, one = (runner.run(_plan(runner, axes="full")) for runner in (both, alone))
     assert pair.actions.tolist() == [TrackAction.KEYED, TrackAction.KEYED]
     assert pair.size - one.size == CORE.byte_costs.repeated
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-6, 0.1])
+@pytest.mark.parametrize("budget", [BOUND / 3, BOUND / 3e6])
+def test_results_that_are_not_smaller_have_no_keys(
+    monkeypatch: pytest.MonkeyPatch, apart: float, budget: float
+) -> None:
+    """Tracks with equal or nearly equal values count once, in int16 and in float32: the size is known before."""
+    times = np.linspace(0, 2, 25)
+    tracks = [track("rotation", times, turning(1.0 + apart * node), node=node) for node in (1, 2)]
+    runner = _bench(clip(*tracks, track("translation", times, np.sin(times[:, None] * [1, 2, 3]), node=1)))
+    plan = _plan(runner, budget)
+    full = runner.run(plan)
+    asked: list[object] = []
+    whole = Candidates.of
+
+    def counted(self: Candidates, axis: SharedAxis, tolerances: Sequence[float]) -> object:
+        asked.append(axis)
+        return whole(self, axis, tolerances)
+
+    monkeypatch.setattr(Candidates, "of", counted)
+    assert runner.run_smaller(plan, full.size) is None
+    assert bool(asked) == (apart == 1e-6 and budget < 1e-6)  # two in float32, which may have become one
+    assert runner.run_smaller(plan, full.size + 1) is not None
 
 
 def test_results_that_are_not_smaller_are_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
