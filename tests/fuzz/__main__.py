@@ -103,9 +103,9 @@ def kind_of(job: Job, outcome: Outcome, found: list[str]) -> str:
     return f"{job.line[0]}: " + re.sub(r"\d+(\.\d+)?", "N", f"{'; '.join(found)}: {outcome.err[:150]}")
 
 
-def replay(folder: Path) -> int:
-    """Run the jobs that were kept in a folder; return 1 if there is a fault."""
-    kept = [load(path) for path in sorted(folder.glob("*.json"))]
+def replay(kept_at: Path) -> int:
+    """Run the jobs that were kept in a folder, or the one in a file; return 1 if there is a fault."""
+    kept = [load(path) for path in ([kept_at] if kept_at.is_file() else sorted(kept_at.glob("*.json")))]
     faults = 0
     for job, outcome in zip(kept, run_jobs(kept, look), strict=True):
         if found := problems(job, outcome):

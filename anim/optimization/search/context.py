@@ -47,13 +47,18 @@ class Context:
         return morph_weights.influence_radius(self.surfaces, node, self.widening(node))
 
     def track_reach(self, track: Track) -> Floats:
-        """Return the displacement (C, V), m, of each vertex that weights of a track move, by each at weight 1."""
+        """Return the displacement (C, V), m, of each vertex that weights of a track move, by each at weight 1.
+
+        Empty for a pointer whose keys have another number of values than there are weights: it moves nothing.
+        """
         moved = [each for each in map(self.morph_reach, moved_nodes(self.skeleton, track)) if each.size]
         if not moved:
             return np.zeros((0, 0))
         every = np.concatenate(moved, axis=1)
         pointer = parse_weight_pointer(track.pointer)
-        return every if pointer is None or pointer.target is None else every[pointer.target : pointer.target + 1]
+        if pointer is not None and pointer.target is not None:
+            every = every[pointer.target : pointer.target + 1]
+        return every if len(every) == track.values.shape[1] else np.zeros((0, 0))
 
     def weights_at_rest(self, node: int) -> Floats:
         """Return the morph weights (M,) of a node in the rest pose."""
