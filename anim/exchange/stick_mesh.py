@@ -27,14 +27,11 @@ def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[
     world = rest_world(skeleton)
     places = world[:, :, 3]
     size = float(np.ptp(places, axis=0).max()) or 1.0
-    pieces, owners = [], []
-    for start, end, owner in _lines(skeleton, places, ends, size):
-        pieces.append(_bipyramid(start, end, size))
-        owners.append(np.full(24, place_of[owner], np.int64))
-    corners = np.concatenate(pieces) if pieces else np.zeros((0, 3))
+    starts, tips, owners = _lines(skeleton, places, ends, size)
+    corners = _bipyramids(starts, tips, size).reshape(-1, 3)
     normals = np.repeat(_normals(corners.reshape(-1, 3, 3)), 3, axis=0)
     holders: Ints = np.zeros((len(corners), 4), np.int64)
-    holders[:, 0] = np.concatenate(owners) if owners else 0
+    holders[:, 0] = np.repeat(np.array([place_of[owner] for owner in owners], np.int64), 24)
     weights = np.tile((1.0, 0.0, 0.0, 0.0), (len(corners), 1))
     faces = np.arange(len(corners)).reshape(-1, 3)
     none = np.zeros((0, len(corners), 3))
@@ -42,33 +39,35 @@ def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[
     return mesh, Skin(joints, matrix.inverse(world[joints]))
 
 
-def _lines(skeleton: Skeleton, places: Floats, ends: frozenset[int], size: float) -> list[tuple[Floats, Floats, int]]:
-    """Start, end and owner of every stick."""
-    lines = []
+def _lines(skeleton: Skeleton, places: Floats, ends: frozenset[int], size: float) -> tuple[Floats, Floats, list[int]]:
+    """Start (S, 3), end (S, 3) and owner of every stick."""
     parents = skeleton.parents.tolist()
-    bare = set(range(len(parents))) - ends
-    for node, parent in enumerate(parents):
-        if parent >= 0 and np.linalg.norm(places[node] - places[parent]) > MIN_LENGTH_FRACTION * size:
-            lines.append((places[parent], places[node], parent))
-            bare.discard(parent)
-    return lines + [(places[node], places[node] + [0, END_LENGTH_FRACTION * size, 0], node) for node in sorted(bare)]
+    below = np.flatnonzero(skeleton.parents >= 0)
+    below = below[_lengths(places[below] - places[skeleton.parents[below]]) > MIN_LENGTH_FRACTION * size]
+    owners = [parents[node] for node in below.tolist()]
+    bare = sorted(set(range(len(parents))) - ends - set(owners))
+    up = places[bare] + [0, END_LENGTH_FRACTION * size, 0]
+    return np.concatenate((places[owners], places[bare])), np.concatenate((places[below], up)), [*owners, *bare]
 
 
-def _bipyramid(start: Floats, end: Floats, size: float) -> Floats:
-    """Corners (24, 3) of eight triangles."""
+def _bipyramids(start: Floats, end: Floats, size: float) -> Floats:
+    """Corners (S, 24, 3) of eight triangles each."""
     along = end - start
-    length = float(np.linalg.norm(along))
+    length = _lengths(along)[:, None]
     ahead = along / length
-    side = np.cross(ahead, (1.0, 0, 0) if abs(ahead[0]) < 0.7 else (0, 0, 1.0))
-    side /= np.linalg.norm(side)
-    radius = min(np.clip(RADIUS_PER_LENGTH * length, MIN_RADIUS * size, MAX_RADIUS * size), length / 2)
-    ring = [radius * v for v in (side, np.cross(ahead, side), -side, -np.cross(ahead, side))]
+    side = np.cross(ahead, np.where(np.abs(ahead[:, :1]) < 0.7, (1.0, 0, 0), (0, 0, 1.0)))
+    side /= _lengths(side)[:, None]
+    radius = np.minimum(np.clip(RADIUS_PER_LENGTH * length, MIN_RADIUS * size, MAX_RADIUS * size), length / 2)
+    other = np.cross(ahead, side)
     middle = start + WIDEST_FRACTION * along
-    triangles = []
-    for i in range(4):
-        a, b = middle + ring[i], middle + ring[(i + 1) % 4]
-        triangles += [start, b, a, end, a, b]
-    return np.array(triangles)
+    ring = [middle + radius * v for v in (side, other, -side, -other)]
+    pairs = [(ring[i], ring[(i + 1) % 4]) for i in range(4)]
+    return np.stack([corner for a, b in pairs for corner in (start, b, a, end, a, b)], axis=1)
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """Length (S,) of vectors (S, 3), each summed as by `np.linalg.norm` of one."""
+    return np.sqrt(np.array([each.dot(each) for each in vectors], np.float64))
 
 
 def _normals(triangles: Floats) -> Floats:

@@ -26,7 +26,10 @@ from anim.show.filmstrip.surface import Surface
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
+MAX_LOADED_BYTES = 1 << 25  # positions of frames that are baked once for all uses
 NUM_FRAMING_FRAMES = 48  # frames of the whole motion for the framing of the camera
+MIN_FRAMING_FRAMES = 8  # of these, of meshes with MAX_FRAMING_VERTICES in few frames
+MAX_FRAMING_VERTICES = 4_000_000  # positions of all framing frames
 MAX_FRAMES = 3000
 STICK_SCALE = 1.9  # width relative to the sticks in files
 MAX_STICK_RATIO = 1.5  # relative to the median width, so that links to distant helper joints don't hide others
@@ -130,12 +133,12 @@ def of_document(
     found: list[FilmstripClip] = []
     for number, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
-        times, path = when.times(start, end), _framing_times(start, end)
+        times, path = when.times(start, end), _framing_times(start, end, sum(map(_num_vertices, scene.instances)))
         if not len(times):
             continue
         for method in methods or ("lbs",):
-            cache = bake(scene, clip, times=times, method=method, rigid=True)
-            whole = bake(scene, clip, times=path, method=method, rigid=True)
+            cache = _load_small(bake(scene, clip, times=times, method=method, rigid=True))
+            whole = _load_small(bake(scene, clip, times=path, method=method, rigid=True))
             if not found and materials is not None:
                 surface, colors = materials.surface(cache)
             elif not found:
@@ -147,6 +150,14 @@ def of_document(
     return found
 
 
+def _load_small(cache: VertexCache) -> VertexCache:
+    """The cache with its frames in memory if they are small: they are used several times, and baked once."""
+    if 12 * cache.frame_count * cache.vertex_count > MAX_LOADED_BYTES:
+        return cache
+    frames = cache.load_all()
+    return replace(cache, chunks=lambda: iter((frames,)))
+
+
 def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
     """Return the motion of a cache. Raises NotFoundError if it has no faces."""
     if not len(cache.faces):
@@ -155,7 +166,7 @@ def of_cache(cache: VertexCache, when: FrameSelection) -> list[FilmstripClip]:
     start, end = float(cache.times[0]), float(cache.times[-1])
     when.check(start, end)
     chosen = resample.resample_frames(cache, when.times(start, end))
-    whole = resample.resample_frames(cache, _framing_times(start, end))
+    whole = resample.resample_frames(cache, _framing_times(start, end, cache.vertex_count))
     return [FilmstripClip(-1, "", "", chosen, whole, palette.face_colors(cache))]
 
 
@@ -262,8 +273,14 @@ def _factors(document: Document) -> list[tuple[float, float, float]]:
     return [(1.0, 1.0, 1.0) if each.texture is not None else each.factor[:3] for each in materials]
 
 
-def _framing_times(start: float, end: float) -> Floats:
-    return np.linspace(start, end, NUM_FRAMING_FRAMES) if end > start else np.array([start])
+def _framing_times(start: float, end: float, vertices: int) -> Floats:
+    """Times of the whole motion for the camera; fewer of many vertices, for memory."""
+    count = min(max(MAX_FRAMING_VERTICES // max(vertices, 1), MIN_FRAMING_FRAMES), NUM_FRAMING_FRAMES)
+    return np.linspace(start, end, count) if end > start else np.array([start])
+
+
+def _num_vertices(instance: MeshInstance) -> int:
+    return len(instance.mesh.positions)
 
 
 def _framing_points(cache: VertexCache, camera_path: root_path.RootPath | None) -> AnyArray:

@@ -11,6 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 
 MAX_BATCH_ROWS = 1 << 20  # rows of triangles drawn at a time
 MAX_BATCH_PIXELS = 1 << 16  # pixels of these rows at a time: temporary arrays fit into the processor's cache
+MAX_OVERDRAW = 32  # triangles per pixel, on average, above which equal ones are drawn once
 EDGE_TOLERANCE_PX = 1e-9  # pixels; tolerance of the inside test, to avoid gaps between adjacent triangles
 MIN_AREA_PX2 = 1e-12  # pixels²; triangles of less area are seen edge-on
 
@@ -29,6 +30,9 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
     seen: Ints = np.full(height * width, -1, np.int64)
     nearest = np.full(height * width, -np.inf)
     shares, near, chosen = _planes(corners)
+    if alpha_test is None and _area(corners[chosen]) > MAX_OVERDRAW * height * width:
+        last = _last_of_equal(corners[chosen])
+        shares, near, chosen = shares[last], near[last], chosen[last]
     y = corners[chosen, :, 1]
     first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
     last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
@@ -37,6 +41,19 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
         owner, line = _expand(first[some], rows[some])
         _draw(owner + some.start, line, shares, near, chosen, seen, nearest, width, alpha_test)
     return seen.reshape(height, width)
+
+
+def _area(corners: Floats) -> float:
+    """Sum of the areas of triangles, in pixels²."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) / 2
+
+
+def _last_of_equal(corners: Floats) -> Ints:
+    """Indices, increasing, of triangles without those that are equal to a later one, which would be seen of both."""
+    rows = np.ascontiguousarray(corners[::-1].reshape(len(corners), 9)).view("V72")[:, 0]
+    _, first = np.unique(rows, return_index=True)
+    return np.sort(len(corners) - 1 - first)
 
 
 def _batches(counts: Ints, most: int) -> Iterator[slice]:

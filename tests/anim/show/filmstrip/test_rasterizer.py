@@ -29,3 +29,23 @@ def test_batches_of_pixels_draw_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     found = rasterizer.visible_faces(corners, width=40, height=30)
     assert np.array_equal(found, expected)
     assert max(sizes) <= 100 < sum(sizes)
+
+
+def test_equal_triangles_are_drawn_once_where_they_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As sticks of nodes at one place: 200 times the picture's area takes that of three triangles."""
+    random = np.random.default_rng(5)
+    some = random.uniform(0, 40, (3, 3, 3))
+    corners = np.tile(some, (200, 1, 1))
+    counts: list[int] = []
+    draw = rasterizer._draw_pixels
+
+    def called(which: Ints, line: Ints, first: Ints, pixels: Ints, *more: Any) -> None:
+        counts.append(int(pixels.sum()))
+        draw(which, line, first, pixels, *more)
+
+    monkeypatch.setattr(rasterizer, "_draw_pixels", called)
+    found = rasterizer.visible_faces(corners, width=40, height=30)
+    assert sum(counts) <= 3 * 40 * 30
+    assert set(np.unique(found)) <= {-1, 597, 598, 599}
+    monkeypatch.setattr(rasterizer, "MAX_OVERDRAW", 10**6)
+    assert np.array_equal(found, rasterizer.visible_faces(corners, width=40, height=30))
