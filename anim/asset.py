@@ -150,7 +150,7 @@ def copy_asset(asset: Asset) -> Asset:
     """Return an equal asset with JSON of its own; an unchanged one still has the bytes it was read from."""
     document, source = replace(asset.document, json=copy_json(asset.document.json)), asset.source
     if source is not None and source.document is asset.document:
-        source = replace(source, document=document)
+        source = source._replace(document=document)
     return Asset(document, source)
 
 

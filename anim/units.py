@@ -9,9 +9,9 @@ from collections.abc import Callable
 from anim.errors import RangeError
 
 BYTES_PER_UNIT = {"": 1, "b": 1, "kb": 1000, "mb": 1_000_000, "gb": 10**9, "kib": 1024, "mib": 1 << 20, "gib": 1 << 30}
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*")
-_ZERO = re.compile(r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*")
-_ZERO_ANGLE = re.compile(r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*")
+_NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zµ°%]*)\s*"
+_ZERO = r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*"
+_ZERO_ANGLE = r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*"
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
@@ -51,12 +51,12 @@ def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
 
 def is_zero(text: str) -> bool:
     """Return True for a length or fraction of 0, with or without unit: "0", "0.0mm", "0%"."""
-    return _ZERO.fullmatch(text) is not None
+    return re.fullmatch(_ZERO, text) is not None
 
 
 def is_zero_angle(text: str) -> bool:
     """Return True for an angle of 0, with or without unit: "0", "0deg"."""
-    return _ZERO_ANGLE.fullmatch(text) is not None
+    return re.fullmatch(_ZERO_ANGLE, text) is not None
 
 
 def has_unit(text: str) -> bool:
@@ -77,7 +77,7 @@ def parse_angle(text: str, name: str) -> float:
 
 def parse_size(text: str, name: str) -> int:
     """Return a number of bytes above 0: "800kB", "1.5 MB", "65536". Raises RangeError otherwise."""
-    value, unit = _split(text.lower(), name) if _NUMBER.fullmatch(text.lower()) else (0.0, "")
+    value, unit = _split(text.lower(), name) if re.fullmatch(_NUMBER, text.lower()) else (0.0, "")
     size = int(value * BYTES_PER_UNIT.get(unit, 0))
     if size <= 0:
         raise RangeError(f"{name} is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
@@ -85,7 +85,7 @@ def parse_size(text: str, name: str) -> int:
 
 
 def _split(text: str, name: str) -> tuple[float, str]:
-    match = _NUMBER.fullmatch(text)
+    match = re.fullmatch(_NUMBER, text)
     if match is None or not math.isfinite(float(match[1])):  # "1e400" is infinite, and would pass every limit
         raise RangeError(f"{name} is '{text}' (expected a number with a unit)")
     return float(match[1]), match[2]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import gc
 import importlib
 import inspect
 import os
@@ -110,7 +109,6 @@ def main() -> None:
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends the process silently, as for other tools
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrix products are small: more threads only cost time
-    gc.disable()  # one short job over many long-lived objects: collection only costs time
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of packages: they are for programmers, and stderr is for messages
     with suppress(ImportError):  # raised again, and reported, when the command runs

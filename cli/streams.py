@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # messages need no numpy
     from anim.arrays import Bytes
 
 
-@dataclass
+@dataclass(eq=False)
 class StepStreams:
     """Bytes and lines that one step reads and writes.
 

@@ -12,10 +12,11 @@ from cli.tables import cut_middle
 
 MAX_LINE_LENGTH = 1000  # characters of a message: names in a file can have any length
 MIN_PERCENT = 1e-4
+DRY = " (dry run: nothing written)"
 MIN_LENGTH_M = 1e-11  # m; smaller lengths come from rounding
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Reporter:
     """Writer of messages by verbosity: errors and warnings only, one line, or all details.
 

@@ -23,7 +23,7 @@ from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.sampling.pose import rest_world
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CheckedFile:
     """A file to check. contents: its readable parts. facts: their report; rules look at its clips only.
 
@@ -86,7 +86,7 @@ class CheckedFile:
         """Return whether some node is above all of these, or one of them."""
         first, _ = self.subtrees
         roots = np.sort(first[self.skeleton.parents < 0])
-        return len(np.unique(np.searchsorted(roots, first[nodes], side="right"))) == 1
+        return len(set(np.searchsorted(roots, first[nodes], side="right").tolist())) == 1  # np.unique imports much
 
     @cached_property
     def scales(self) -> TrackTable:
@@ -104,7 +104,7 @@ class CheckedFile:
 
     def at_keys(self, table: TrackTable, marked: Bools) -> Iterator[Occurrence]:
         """Yield an occurrence for each clip with marked keys (S,), at the first of them."""
-        for clip, count in table.per_clip(table.count(marked)):
+        for clip, count in table.per_clip(table.count_marked(marked)):
             node, time_s = table.first_key(clip, marked)
             yield self.in_clip(clip, count, time_s=time_s, node=node)
 
@@ -119,7 +119,7 @@ class CheckedFile:
         table = track_table(clips.items(), "rotation", lambda track: track.interpolation is interpolation)
         marked = table.inner_steps()
         marked[1:] &= is_fault(quaternion.dot(table.values[1:], table.values[:-1]))
-        at = {number: table.first_key(number, marked) for number, _ in table.per_clip(table.count(marked))}
+        at = {number: table.first_key(number, marked) for number, _ in table.per_clip(table.count_marked(marked))}
         for number in clips:
             node, time_s = at.get(number, (None, None))  # without one: tracks of pointers
             yield self.in_clip(number, counts[number], time_s=time_s, node=node)

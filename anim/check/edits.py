@@ -1,4 +1,7 @@
-"""Edits of documents that fixes share."""
+"""Edits of documents that fixes share.
+
+Every run of `inspect` imports this module: what only a fix needs is imported where it is used.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +16,14 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence
 from anim.gltf.document import Document
 from anim.maths import quaternion
-from anim.measure.inspect.track_statistics import stats
 from anim.model import Clip, Interpolation, Track
-from anim.operations.cubic_segments import with_distinct_keys
-from anim.optimization.tracks.clip_ends import extend, single_key
-from anim.sampling.batch import concatenate
 
 ROUNDING = 1e-4  # fraction of an angle between keys, by which it may grow when it is stored
 
 
 def replace_clips(file: CheckedFile, clips: Mapping[int, Clip]) -> Document:
     """Return the document with these clips, by index; the same one if none of them has another track."""
-    from anim.gltf.writing import writer  # only fixes write
+    from anim.gltf.writing import writer
 
     changed = {}
     for number, new in clips.items():
@@ -47,6 +46,8 @@ def edit_tracks(file: CheckedFile, found: Sequence[Occurrence], edit: Callable[[
 
 def remove_tracks(clip: Clip, removed: Collection[int]) -> Clip:
     """Return the clip without tracks by index, of the same duration; of all of them the first stays, with one value."""
+    from anim.optimization.tracks.clip_ends import single_key
+
     left = [track for i, track in enumerate(clip.tracks) if i not in removed]
     return keep_duration(clip, left or [single_key(clip.tracks[0])])
 
@@ -63,6 +64,10 @@ def remove_tracks_at(file: CheckedFile, path: str, targets: Collection[tuple[int
 
 def single_keys(clip: Clip, file: CheckedFile) -> Clip:
     """Return the clip with a single key in constant tracks, and of the same duration; splines may keep two."""
+    from anim.measure.inspect.track_statistics import stats
+    from anim.optimization.tracks.clip_ends import single_key
+    from anim.sampling.batch import concatenate
+
     constant = stats(concatenate(clip.tracks), file.skeleton).constant
     several = [len(each.times) > 1 + (each.in_tangents is not None) for each in clip.tracks]
     tracks = [single_key(each) if constant[i] and several[i] else each for i, each in enumerate(clip.tracks)]
@@ -71,6 +76,8 @@ def single_keys(clip: Clip, file: CheckedFile) -> Clip:
 
 def keep_duration(clip: Clip, tracks: Sequence[Track]) -> Clip:
     """Return a clip of these tracks; the longest one is extended if they are shorter than the clip."""
+    from anim.optimization.tracks.clip_ends import extend
+
     new = replace(clip, tracks=tuple(tracks))
     if new.start <= clip.start and new.end >= clip.end:
         return new
@@ -81,6 +88,8 @@ def keep_duration(clip: Clip, tracks: Sequence[Track]) -> Clip:
 
 def put_between(track: Track, widest: float) -> Track:
     """Return a LINEAR rotation track with keys, by slerp, between those that are further apart than `widest` rad."""
+    from anim.operations.cubic_segments import with_distinct_keys
+
     if track.path != "rotation" or track.interpolation is not Interpolation.LINEAR or len(track.times) < 2:
         return track
     values = quaternion.normalize(track.values)

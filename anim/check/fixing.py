@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,7 @@ class AppliedFix:
     error_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class RefusedFix:
+class RefusedFix(NamedTuple):
     """A fix that was left out: for its error in m, or for a problem of the file."""
 
     rule: Rule
@@ -45,8 +45,7 @@ class RefusedFix:
     problem: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class FixResult:
+class FixResult(NamedTuple):
     """The fixed document, the fixes in it, and those left out."""
 
     document: Document
@@ -123,7 +122,7 @@ def _reread(document: Document, before: CheckedFile) -> CheckedFile:
     written = read_contents(container.read(data), file_bytes=before.contents.file_bytes)
     if written.faults:
         raise written.faults[0].at("a fix made the file invalid", ": ")
-    contents = replace(written, document=document)
+    contents = written._replace(document=document)
     return CheckedFile(contents, inspect(contents), before.missing)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -60,8 +59,7 @@ def _different(old: Surface, new: Surface) -> Ints:
 
 def _part(surface: Surface, vertices: Ints) -> Surface:
     """The surface with some of its vertices."""
-    return replace(
-        surface,
+    return surface._replace(
         points=surface.points[vertices],
         targets=surface.targets[:, vertices],
         joints=surface.joints[vertices],

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints
 from anim.check.checked_file import CheckedFile
 from anim.gltf.document import Document, Json, copy_json, json_array
-from anim.gltf.writing.append import VERTICES, append_accessors
-from anim.gltf.writing.removal import remove_unused_accessors
 
 DRACO = "KHR_draco_mesh_compression"
 MAX_UINT8 = 255
@@ -26,6 +24,8 @@ def edit_influences(file: CheckedFile, skins: set[int], edit: Edit) -> Document:
     Accessors that several primitives of a skin use are edited once for it. Vertices that Draco compresses, and meshes
     of other skins too, keep theirs. Weights are written as float32; those that `edit` returns as they are stay.
     """
+    from anim.gltf.writing.removal import remove_unused_accessors  # only fixes write
+
     document = replace(file.document, json=copy_json(file.json))
     done: dict[tuple[int, ...], dict[str, int | None]] = {}
     replaced: set[int] = set()
@@ -70,6 +70,8 @@ def _append(document: Document, old: Floats, edited: tuple[Ints, Floats]) -> tup
 
     old: the weights before; if they are returned, their attributes get None and keep their accessors.
     """
+    from anim.gltf.writing.append import VERTICES, append_accessors
+
     joints, weights = edited
     stored = joints.astype("u1" if joints.max(initial=0) <= MAX_UINT8 else "<u2")
     parts = [slice(k, k + 4) for k in range(0, joints.shape[1], 4)]

@@ -99,6 +99,6 @@ def _redirect(target: Json, found: Target, old: int, new: int) -> None:
     single = parse_weight_pointer(pointer)
     if (node, path) == (old, "weights") and pointer is None:
         target["node"] = new
-    elif single is not None and (single.owner, single.index) == ("nodes", old):
+    elif single is not None and (single.owner, single.owner_index) == ("nodes", old):
         end = "" if single.target is None else f"/{single.target}"
         target["extensions"][EXTENSION]["pointer"] = f"/nodes/{new}/weights{end}"

@@ -7,12 +7,11 @@ Babylon.js, bevy, Filament and Scene Viewer, raylib; Quick Look by usd_from_gltf
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Player:
+class Player(NamedTuple):
     """Support of a player. cubic, step, pointer: text on the problem, "" if it plays them.
 
     influences, joints, morph_targets, skins, clips, roots: largest numbers, None for no limit known. extensions: not

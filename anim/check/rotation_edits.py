@@ -29,7 +29,7 @@ def edit_rotations(file: CheckedFile, found: Sequence[Occurrence], marks: Marks,
             break
         keys = motion.keys.copy()
         keys[marked] = quaternion.normalize(edit(motion.keys, marked))
-        motion = steps_of(replace(motion.table, values=keys))
+        motion = steps_of(motion.table._replace(values=keys))
     signs = np.where(quaternion.dot(first.keys, first.table.values) < 0, -1.0, 1.0)
     same = (motion.keys == first.keys).all(axis=1)
     values = np.where(same[:, None], first.table.values, motion.keys * signs[:, None])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from anim.model import Interpolation, Track
 MIN_KEYS = 6
 
 
-@dataclass(frozen=True, slots=True)
-class RotationSteps:
+class RotationSteps(NamedTuple):
     """Keys (S, 4) of LINEAR rotation tracks with continuous signs, one track after the other.
 
     steps: (S, 4), twice the difference to the key before: its length is the angle in rad for small steps; 0 at the

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from anim.check.advice import clip_advice
 from anim.check.checked_file import CheckedFile
@@ -18,8 +17,7 @@ MAX_LISTED_PARTS = 3  # parts of a file in one finding
 _NONE: Mapping[str, Any] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(NamedTuple):
     """Number that a rule depends on. unit: "deg", "%", "s", "fps", "x" (a factor), or "" for a count."""
 
     default: float
@@ -27,8 +25,7 @@ class Parameter:
     about: str
 
 
-@dataclass(frozen=True, slots=True)
-class TextParameter:
+class TextParameter(NamedTuple):
     """Regular expression that a rule depends on. example: for messages."""
 
     default: str
@@ -45,8 +42,7 @@ class Parameters(dict[str, float]):
         self.target = target
 
 
-@dataclass(frozen=True, slots=True)
-class Fix:
+class Fix(NamedTuple):
     """Change of a document after which the rule finds nothing.
 
     is_safe: no vertex moves by more than 1e-6 of the model's diagonal, which `fixing` measures on the written bytes.
@@ -60,8 +56,7 @@ class Fix:
     yields_to: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(NamedTuple):
     """One rule.
 
     code: stable; its first digit is the group. about: one line. why: evidence, and who is hurt. find: occurrences in a
@@ -81,11 +76,11 @@ class Rule:
     problem: Callable[[Sequence[Occurrence]], str] | None = None
     advice: str = ""
     fix: Fix | None = None
-    parameters: Mapping[str, Parameter] = field(default_factory=lambda: _NONE)
+    parameters: Mapping[str, Parameter] = _NONE
     is_default: bool = True
     is_costly: bool = False
-    targets: Mapping[str, Severity] = field(default_factory=lambda: MappingProxyType({}))
-    texts: Mapping[str, TextParameter] = field(default_factory=lambda: _NONE)
+    targets: Mapping[str, Severity] = _NONE
+    texts: Mapping[str, TextParameter] = _NONE
 
     def defaults(self, target: str = "") -> Parameters:
         """Return the default of each parameter."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.model import Clip, Track
 
 
-@dataclass(frozen=True, slots=True)
-class TrackTable:
+class TrackTable(NamedTuple):
     """Keys (S, C) of T tracks with a node, one after the other. clips, nodes, starts, counts: (T,). times: (S,) s."""
 
     clips: Ints
@@ -22,7 +21,7 @@ class TrackTable:
     values: Floats
     times: Floats
 
-    def count(self, marked: Bools) -> Ints:
+    def count_marked(self, marked: Bools) -> Ints:
         """Return the number of marked keys (S,) of each track (T,)."""
         return np.asarray(np.add.reduceat(marked, self.starts, dtype=np.int64)) if len(self.starts) else self.starts
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
-_POINTER = re.compile(r"/(nodes|meshes)/(0|[1-9][0-9]{0,8})/weights(?:/(0|[1-9][0-9]{0,8}))?")
+_POINTER = r"/(nodes|meshes)/(0|[1-9][0-9]{0,8})/weights(?:/(0|[1-9][0-9]{0,8}))?"
 
 
-@dataclass(frozen=True, slots=True)
-class MorphedNode:
+class MorphedNode(NamedTuple):
     """Node with a mesh that has morph targets.
 
     node, mesh: indices in the file. weights: (M,) at rest. has_own: whether these are the node's, which replace those
@@ -22,12 +21,14 @@ class MorphedNode:
     has_own: bool
 
 
-@dataclass(frozen=True, slots=True)
-class WeightPointer:
-    """Target of a pointer to morph weights. owner: "nodes" or "meshes". target: one morph target, None for all."""
+class WeightPointer(NamedTuple):
+    """Target of a pointer to morph weights.
+
+    owner, owner_index: "nodes" or "meshes", and which. target: one morph target, None for all.
+    """
 
     owner: str
-    index: int
+    owner_index: int
     target: int | None
 
 
@@ -36,7 +37,7 @@ def parse_weight_pointer(pointer: str | None) -> WeightPointer | None:
 
     parse_weight_pointer("/meshes/3/weights/1") → ("meshes", 3, 1)
     """
-    match = _POINTER.fullmatch(pointer or "")
+    match = re.fullmatch(_POINTER, pointer) if pointer else None
     if match is None:
         return None
     return WeightPointer(match[1], int(match[2]), None if match[3] is None else int(match[3]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +33,7 @@ class Skin:
         return f"Skin(joints={len(self.joints)})"
 
 
-@dataclass(frozen=True, slots=True)
-class PrimitiveRange:
+class PrimitiveRange(NamedTuple):
     """Numbers of vertices and faces of one primitive. material: its index in the file, −1 for none."""
 
     vertices: int

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,8 +36,7 @@ class ValueKind(StrEnum):
     DISCRETE = "discrete"  # bool or integer: STEP only
 
 
-@dataclass(frozen=True, slots=True)
-class AccessorFormat:
+class AccessorFormat(NamedTuple):
     """Storage format of values: glTF's component type, normalization of integers, and element type.
 
     element: "SCALAR", "VEC3", …; None if the path determines it.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,7 @@ from anim.errors import NotFoundError, RangeError, ShapeError, check_type
 from anim.model import Clip, Skeleton
 
 
-@dataclass(frozen=True, slots=True)
-class Selection:
+class Selection(NamedTuple):
     """Globs for names of clips and nodes, and paths of tracks; empty selects all."""
 
     clips: Sequence[str] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
@@ -19,7 +19,7 @@ Rule: TypeAlias = tuple[str, Interpolation, ValueKind, int]
 Tangents: TypeAlias = tuple[Floats, Floats]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackGroup:
     """T tracks of one path, interpolation, value type and number of components: a rule.
 
@@ -45,7 +45,7 @@ class TrackGroup:
         return self.tracks[0].kind
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Batch(TrackGroup):
     """G tracks of one rule with the same times.
 
@@ -100,11 +100,11 @@ class LazyBatch:
         if self._whole is not None or 2 * (high - low) >= keys or self._stacked > 2 * keys:
             return self.whole, place
         joined = _stack_values(self.tracks, lambda each: np.stack([values[low:high] for values in each], axis=1))
-        moved = replace(place, left=place.left - low, right=place.right - low)
+        moved = place._replace(left=place.left - low, right=place.right - low)
         return Batch(self.tracks, self.numbers, TimeAxis(self.time_axis.times[low:high]), *joined), moved
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MixedBatch(TrackGroup):
     """G tracks of one rule with different times, keys concatenated: S keys in all.
 
@@ -121,9 +121,7 @@ class MixedBatch(TrackGroup):
     def find_intervals(self, places: Mapping[TimeAxis, KeyInterval]) -> KeyInterval:
         """Return the key intervals (F, G) of all tracks, from those of the axes at F times."""
         found = [places[axis] for axis in self.axes]
-        left, right, u, duration = (
-            np.stack([getattr(each, name) for each in found], axis=1)[:, self.axis_of] for name in KeyInterval.__slots__
-        )
+        left, right, u, duration = (np.stack(parts, axis=1)[:, self.axis_of] for parts in zip(*found, strict=True))
         return KeyInterval(left + self.starts, right + self.starts, u, duration)
 
     def is_inside(self, at: Floats) -> Bools:
@@ -171,7 +169,7 @@ def batches(tracks: Iterable[Track]) -> list[Batch]:
     return [each.whole for each in lazy_batches(tracks)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ConcatenatedTracks(TrackGroup):
     """T tracks of one rule, concatenated: S keys in all.
 

@@ -10,7 +10,7 @@ measured with that player's interpolation.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,7 @@ THREE_NLERP_DOT = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot p
 BABYLON_LERP_DOT = 0.999999  # Babylon.js 7, Quaternion.SlerpToRef: from this dot product on the chord, not normalized
 
 
-@dataclass(frozen=True, slots=True)
-class PlayerModel:
+class PlayerModel(NamedTuple):
     """Interpolation of rotations by a player.
 
     about: players that use it. normalizes: whether values at keys, of STEP and outside the keys are normalized.

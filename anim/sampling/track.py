@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from anim.model import Interpolation, Track, ValueKind
 MIN_QUATERNION_COMPONENT = 1e-9  # a quaternion whose largest component is below this has no direction
 
 
-@dataclass(frozen=True, slots=True)
-class KeyInterval:
+class KeyInterval(NamedTuple):
     """Key intervals of times, found once per time axis for all of its tracks.
 
     left: (F,) key at or before each time (before the first key the first). right: (F,) the next key, or the last.

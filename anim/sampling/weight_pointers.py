@@ -66,7 +66,7 @@ def moved_nodes(skeleton: Skeleton, track: Track) -> list[int]:
     if pointer is None:
         return [] if track.node is None else [track.node]
     is_node = pointer.owner == "nodes"
-    return [each.node for each in skeleton.morphed if (each.node if is_node else each.mesh) == pointer.index]
+    return [each.node for each in skeleton.morphed if (each.node if is_node else each.mesh) == pointer.owner_index]
 
 
 def _parse(track: Track) -> WeightPointer | None:
@@ -125,7 +125,7 @@ def _merge(tracks: Sequence[Track], each: MorphedNode, columns: Sequence[Column]
     keys = times if axis is None else axis
     if kind is not Interpolation.CUBICSPLINE:
         return Track(each.node, "weights", kind, keys, values)
-    still = replace(each, weights=(0.0,) * len(each.weights))
+    still = each._replace(weights=(0.0,) * len(each.weights))
     arriving, leaving = (
         _assemble(still, columns, {i: derivatives.rates(t, times, before=before) for i, t in chosen.items()})
         for before in (True, False)

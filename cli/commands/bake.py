@@ -27,7 +27,6 @@ from cli.text import Reporter
 from cli.workflows.bake_clip import BakeOptions, default_directions, keeps_materials, keeps_nodes
 from cli.workflows.bake_jobs import PLACEHOLDERS, bake_jobs, mesh_groups
 from cli.workflows.bake_run import BakeRun, FileOptions
-from cli.workflows.cache_page import check_cache_page, write_cache_page
 
 LBS = Method("lbs")
 Space = StrEnum("Space", [(name, name) for name in SPACES])  # type: ignore[misc]
@@ -124,8 +123,11 @@ def command(
     }
     files = FileOptions(ending, values, max_error, up, vertex_order, keep_skeleton, dry_run)
     files.check(normals=bool(normals), tangents=bool(tangents))
-    moved = {"--space mesh": space is not WORLD, "--up": up is not None, "--vertex-order": vertex_order is not None}
-    check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
+    if html is not None:
+        from cli.workflows.cache_page import check_cache_page, write_cache_page  # imports all readers of curves
+
+        moved = {"--space mesh": space is not WORLD, "--up": up is not None, "--vertex-order": vertex_order is not None}
+        check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
     with documents.source(input, reporter) as source:
         document = source.document
         clips = reader.clips(document)
@@ -156,7 +158,7 @@ def command(
     report_notes(run.files, reporter)
     normalized_keys_note({job.clip: clips[job.clip] for job in jobs if job.clip is not None}, reporter)
     run.report_findings()
-    took = text.format_duration(time.perf_counter() - began) + (" (dry run: nothing written)" if dry_run else "")
+    took = text.format_duration(time.perf_counter() - began) + (text.DRY if dry_run else "")
     reporter.info(f"{summarize_files(run.files, method.value)}, {took}")
     if html is not None and not dry_run:
         (baked,) = run.files

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import PurePath
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import typer
@@ -36,8 +35,7 @@ from cli.reports import diff_report, vertex_report
 from cli.reports.diff_report import DiffReport, File
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length
-from cli.workflows.diff_plot import check_plot, draw_errors
-from cli.workflows.vertex_motion import is_bake_of, pages_of
+from cli.workflows.mesh_pairs import is_bake_of, pages_of
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
 SPEC = Player("spec")
@@ -111,7 +109,10 @@ def command(
         raise UsageError("A and B can't both be stdin")
     if fps <= 0:
         raise UsageError(f"--samples-per-second is {fps:g} (expected a number above 0)")
-    kind = "" if plot is None else check_plot(plot)
+    if plot is not None:
+        from cli.workflows.diff_plot import check_plot, draw_errors
+
+        kind = check_plot(plot)
     if html is not None:
         from cli.io.page_output import check_page  # imports readers of all formats, as in the functions below
 
@@ -235,8 +236,7 @@ def _players(new: str | None, player: str, players: str | None) -> str:
     return players
 
 
-@dataclass(frozen=True, slots=True)
-class _Side:
+class _Side(NamedTuple):
     """One of the two inputs, read."""
 
     file: File

@@ -15,7 +15,7 @@ from anim.check.rules.invalid import RULE as INVALID
 from anim.check.rules.invalid import fault_occurrences
 from anim.errors import AnimError, FormatError
 from anim.measure.inspect.contents import FileContents
-from anim.measure.inspect.report import Facts
+from anim.measure.inspect.report import ClipReport, Facts
 from anim.operations.selection import Selection
 from cli import errors, tables
 from cli.errors import CheckError, UsageError
@@ -188,12 +188,16 @@ def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> No
 
 def _plain(inspected: Inspected) -> dict[str, Any]:
     """Report as JSON values: tracks only if requested, and the first error as text."""
-    facts = asdict(inspected.facts)
+    facts = inspected.facts._asdict()
     faults = facts.pop("faults")
-    facts["findings"] = [asdict(each) for each in inspected.findings]
+    facts["clips"] = [_plain_clip(each) for each in inspected.facts.clips]
+    facts["skins"] = [asdict(each) for each in inspected.facts.skins]
+    facts["findings"] = [each._asdict() for each in inspected.findings]
     facts["error"] = str(faults[0]) if faults else None
-    for clip in facts["clips"]:
-        listed = clip.pop("track_list")
-        if listed:
-            clip["track_list"] = listed
     return facts
+
+
+def _plain_clip(report: ClipReport) -> dict[str, Any]:
+    values = asdict(report)
+    listed = [track._asdict() for track in values.pop("track_list")]
+    return {**values, "track_list": listed} if listed else values

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 
-@dataclass
+@dataclass(eq=False)
 class FileRecord:
     """Files that a command read and wrote, by the names that it used for them."""
 

@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -229,7 +228,7 @@ def _open_file(path: str, opener: Opener) -> Source:
     found = open_file(located, opener)
     record_files(Path(located), *buffer_files(found))
     depfile.add_inputs(Path(located), *filter(os.path.isfile, external_files(found)))
-    return replace(found, name=path)
+    return found._replace(name=path)
 
 
 def _read_file(path: str, ending: str) -> Bytes:

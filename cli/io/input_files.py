@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import glob
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from anim.errors import NotFoundError
 from anim.gltf.io import container
 from cli.io import documents
 
 
-@dataclass(frozen=True, slots=True)
-class FoundFile:
+class FoundFile(NamedTuple):
     """An input file. folder: the named folder, the fixed part of the pattern, or that of the file.
 
     is_searched: True if a folder or a pattern led to it.
@@ -50,20 +48,25 @@ def _find_one(path: str) -> list[FoundFile]:
         if not found:
             raise NotFoundError(f"{path}: has no {' or '.join(container.SUFFIXES)} file")
         return [FoundFile(each, path, is_searched=True) for each in found]
-    if glob.has_magic(path) and not os.path.lexists(path):
-        found = sorted(each for each in glob.glob(path, recursive=True) if os.path.isfile(each))
-        if not found:
-            raise NotFoundError(f"{path}: matches no file")
-        return [FoundFile(each, _fixed_folder(path), is_searched=True) for each in found]
-    return [FoundFile(path, os.path.dirname(path) or ".")]
+    return _matches(path) if not os.path.lexists(path) else [_named(path)]
 
 
-def _fixed_folder(pattern: str) -> str:
-    """The folders of a pattern before the first part with a wildcard: "in" of "in/**/*.glb"."""
+def _named(path: str) -> FoundFile:
+    return FoundFile(path, os.path.dirname(path) or ".")
+
+
+def _matches(pattern: str) -> list[FoundFile]:
+    import glob  # compiles expressions, and few names are patterns
+
+    if not glob.has_magic(pattern):
+        return [_named(pattern)]
+    found = sorted(each for each in glob.glob(pattern, recursive=True) if os.path.isfile(each))
+    if not found:
+        raise NotFoundError(f"{pattern}: matches no file")
     folder = os.path.dirname(pattern)
     while glob.has_magic(folder):
-        folder = os.path.dirname(folder)
-    return folder or "."
+        folder = os.path.dirname(folder)  # the part before the first wildcard: "in" of "in/**/*.glb"
+    return [FoundFile(each, folder or ".", is_searched=True) for each in found]
 
 
 def _in_folder(folder: Path) -> Iterator[str]:

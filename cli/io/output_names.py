@@ -13,12 +13,12 @@ FORBIDDEN = frozenset('/\\:*?"<>|')  # invalid in names on some file systems
 RESERVED = frozenset(("con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))))
 MAX_NAME_BYTES = 100  # of 255 in most file systems: the pattern may have several, and words around them
 OF_PATHS = ("path", "folder", "name", "stem")  # of names that follow from an input's
-_PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
+_PLACEHOLDER = r"\{([A-Za-z_]\w*)\}"
 
 
 def check_placeholders(output: str, known: Sequence[str] = ()) -> None:
     """Raise UsageError for an unknown placeholder, such as {foo}, in an output name."""
-    for name in _PLACEHOLDER.findall(output):
+    for name in re.findall(_PLACEHOLDER, output):
         if name not in known:
             expected = " or ".join(f"{{{each}}}" for each in known)
             raise UsageError(
@@ -61,7 +61,7 @@ def fixed_folder(output: str) -> str:
 
 
 def _filled(output: str, values: Mapping[str, str]) -> str:
-    return _PLACEHOLDER.sub(lambda match: values.get(match[1], match[0]), output)
+    return re.sub(_PLACEHOLDER, lambda match: values.get(match[1], match[0]), output)
 
 
 def _plain(name: str) -> str:

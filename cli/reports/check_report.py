@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import groupby
 
 from anim.check.baseline import FileFinding, fingerprint
@@ -117,7 +117,7 @@ def as_json(report: CheckReport) -> str:
         "schema": SCHEMA,
         "files": list(report.files),
         "findings": [
-            {"file": path, **asdict(each), "fingerprint": fingerprint(path, each)} for path, each in report.found
+            {"file": path, **each._asdict(), "fingerprint": fingerprint(path, each)} for path, each in report.found
         ],
         "errors": [{"file": path, "error": str(error)} for path, error in report.refused],
         "known": report.known,

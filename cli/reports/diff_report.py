@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.diff import END_TOLERANCE_S, ClipDiff, Diff
@@ -25,8 +24,7 @@ HEADER = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class File:
+class File(NamedTuple):
     """One of the two files: its name, its bytes, the stored bytes of its animations, and its clip names."""
 
     name: str
@@ -35,8 +33,7 @@ class File:
     clips: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class DiffReport:
+class DiffReport(NamedTuple):
     """Comparison of two files, and its settings.
 
     nodes_by_name: number of nodes of the old file with a node of the same name in the new one. are_named: whether

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import fields
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from anim.check.finding import Finding, Occurrence
 from anim.gltf.reading.reader import clip_name
@@ -24,8 +24,7 @@ MARKS = {"error": "error  ", "warning": "warning", "info": "info   "}
 Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip and track
 
 
-@dataclass(frozen=True, slots=True)
-class Inspected:
+class Inspected(NamedTuple):
     """A file's name, size, contents and findings. occurrences: of each finding, if they are known."""
 
     name: str
@@ -57,7 +56,7 @@ def page(inspected: Inspected, smooth: Smoothness = (), *, tracks: bool) -> str:
 
 def clip_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
     """Return header and rows of one table: a row per clip of every file."""
-    plain = [key for key in _fields(ClipReport) if key not in ("tracks", "interpolations", "track_list")]
+    plain = [each.name for each in fields(ClipReport) if each.name not in ("tracks", "interpolations", "track_list")]
     header = ["file", *plain, *(f"{path}_tracks" for path in PATHS), "interpolations"]
     rows = [
         [
@@ -74,18 +73,14 @@ def clip_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
 
 def track_rows(files: Sequence[Inspected]) -> tuple[list[str], list[list[Cell]]]:
     """Return header and rows of one table: a row per track of every clip of every file."""
-    header = ["file", "clip", *_fields(TrackReport)]
+    header = ["file", "clip", *TrackReport._fields]
     rows: list[list[Cell]] = [
-        [each.name, clip_name(clip.name, clip.index), *asdict(track).values()]
+        [each.name, clip_name(clip.name, clip.index), *track]
         for each in files
         for clip in each.facts.clips
         for track in clip.track_list
     ]
     return header, rows
-
-
-def _fields(kind: type[ClipReport] | type[TrackReport]) -> list[str]:
-    return list(kind.__dataclass_fields__)
 
 
 def _headline(name: str, file_bytes: int, facts: Facts) -> str:

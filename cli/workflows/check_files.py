@@ -13,7 +13,6 @@ from anim.check.budget import ERROR, measure_budget
 from anim.check.checked_file import CheckedFile
 from anim.check.find import find_all
 from anim.check.finding import Severity
-from anim.check.fixing import fix_all
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.rules.invalid import fault_occurrences
 from anim.check.selection import RuleSelection
@@ -22,10 +21,9 @@ from cli import units
 from cli.errors import UsageError
 from cli.io import documents, input_files
 from cli.reports.check_report import SOURCE
-from cli.text import Reporter, format_length
+from cli.text import DRY, Reporter, format_length
 from cli.workflows import check_config, checked_files
 from cli.workflows.check_config import Budget, CheckConfig
-from cli.workflows.edit_clips import DRY
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +170,8 @@ class FileChecker:
 
     def _fix(self, path: str, selection: RuleSelection, *, unsafe: bool) -> None:
         """Fix a file in place; broken ones stay as they are, and are reported when they are checked."""
+        from anim.check.fixing import fix_all  # imports what measures errors
+
         if path == documents.PIPE:
             raise UsageError("stdin can't be fixed in place: name files")
         with suppress(FormatError, UnsupportedError), checked_files.open_checked(path) as (source, file):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import PurePath
 
 from anim.gltf.reading import reader
@@ -39,8 +38,7 @@ def draw_errors(
     """Return the plot of the worst clips. kind: "png" or "svg". limit: m, a line in it."""
     apart = [each for each in report.diff.clips if each.error.max_error >= picture.MIN_ERROR_M]
     profiles = [
-        replace(
-            error_curve(ruler, old[each.old], new[each.new], player=report.player, fps=report.fps),
+        error_curve(ruler, old[each.old], new[each.new], player=report.player, fps=report.fps)._replace(
             name=reader.clip_name(each.name, each.old),
         )
         for each in apart[: picture.LIMIT]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 from anim.errors import AnimError
 from anim.gltf.document import Document
@@ -28,16 +28,14 @@ from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
 from cli.reports.rotation_notes import describe_non_unit_keys
-from cli.text import format_span, format_time
+from cli.text import DRY, format_span, format_time
 
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by index in the file
-DRY = " (dry run: nothing written)"
 MAX_LISTED_CLIPS = 3  # clips listed with their durations; of more the sum
 
 
-@dataclass(frozen=True, slots=True)
-class EditResult:
+class EditResult(NamedTuple):
     """Clips of a file before and after, by index, and the largest error on the surface.
 
     at_nodes: whether only nodes were measured, because the surface could not be read.
@@ -175,7 +173,7 @@ def _worst(measured: list[Proof]) -> Proof | None:
         return None
     worst = max(measured, key=lambda each: each.error.max_error)
     bounds = [each.bound for each in measured if each.bound is not None]
-    return replace(worst, bound=max(bounds) if len(bounds) == len(measured) else None)
+    return worst._replace(bound=max(bounds) if len(bounds) == len(measured) else None)
 
 
 def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], reporter: text.Reporter) -> None:

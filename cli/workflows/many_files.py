@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from anim.errors import AnimError, NotFoundError, not_written
 from anim.units import plural
@@ -16,8 +16,7 @@ from cli.text import Reporter
 from cli.typer_options import name_options
 
 
-@dataclass(frozen=True, slots=True)
-class FilePair:
+class FilePair(NamedTuple):
     """Input and output of one file."""
 
     input: str

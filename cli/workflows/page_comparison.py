@@ -15,7 +15,7 @@ from anim.show.page.paired_meshes import PairedMeshes, pair_cache_meshes, pair_n
 from cli.io.scenes import read_scene
 from cli.reports import bake_notes
 from cli.text import Reporter, format_length
-from cli.workflows.vertex_motion import is_bake_of, node_pairs
+from cli.workflows.mesh_pairs import is_bake_of, node_pairs
 
 
 def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: str | None = None) -> PageContent:

@@ -18,7 +18,7 @@ from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter
-from cli.workflows import vertex_motion
+from cli.workflows import mesh_pairs, vertex_motion
 from cli.workflows.vertex_motion import VertexMotion, cache_motion, common_times, pair_documents, pair_with_cache
 
 GLTF = (".glb", ".gltf")
@@ -73,10 +73,10 @@ def _opened(path: str, reporter: Reporter, opened: Opened) -> Iterator[_Side]:
             yield _Side(loaded.name, loaded.size, None, loaded.cache)
     elif documents.called(path) in opened:
         document, size, scene = opened[documents.called(path)]
-        yield _Side(documents.called(path), size, document, vertex_motion.pages_of(document), scene)
+        yield _Side(documents.called(path), size, document, mesh_pairs.pages_of(document), scene)
     else:
         with documents.source(path, reporter) as source:
-            cache = vertex_motion.pages_of(source.document)
+            cache = mesh_pairs.pages_of(source.document)
             scene = scenes.read_scene(source.document, source.name, reporter)
             yield _Side(source.name, source.size, source.document, cache, scene)
 
@@ -96,7 +96,7 @@ def _motions(
         return clip.name, first, second
     assert one.document is not None
     assert other.document is not None
-    if vertex_motion.is_bake_of(one.scene_of(), other.scene_of(), len(reader.names(other.document))):
+    if mesh_pairs.is_bake_of(one.scene_of(), other.scene_of(), len(reader.names(other.document))):
         return _of_documents((one, one.document), (other, other.document), globs, reporter)
     label, second, first = _of_documents((other, other.document), (one, one.document), globs, reporter)
     return label, first, second

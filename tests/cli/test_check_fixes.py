@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from anim.check import fixing
 from anim.errors import UnsupportedError
-from cli.workflows import check_files
 from tests.cli.checking import codes
 from tests.cli.conftest import Call
 from tests.cli.running import built
@@ -60,7 +60,7 @@ def test_a_file_that_cannot_be_fixed_stays_and_the_others_are_fixed(
     def refuse(*args: object, **options: object) -> None:
         raise UnsupportedError("has an extension that names its keys")
 
-    monkeypatch.setattr(check_files, "fix_all", refuse)
+    monkeypatch.setattr(fixing, "fix_all", refuse)
     before = (folder / "noop.glb").read_bytes()
     run = call("check", "noop.glb", "--fix", "-q")
     assert (run.code, run.err) == (0, "warning: noop.glb is not fixed: has an extension that names its keys\n")

@@ -22,7 +22,7 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
-from cli.workflows import vertex_motion
+from cli.workflows import mesh_pairs
 from fixtures.broken.pieces import buffered, text
 from tests import many
 from tests.cli.conftest import Call
@@ -260,6 +260,6 @@ def test_skins_are_reported_by_their_own_meshes(call: Call, tmp_path: Path) -> N
 
 def test_meshes_of_two_files_are_paired_by_tables(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "in.glb").write_bytes(many.skins(100))
-    counted = _count_calls(monkeypatch, vertex_motion, "_name")
+    counted = _count_calls(monkeypatch, mesh_pairs, "node_name")
     call("diff", tmp_path / "in.glb", tmp_path / "in.glb").product()
     assert 0 < len(counted) <= 4 * 100

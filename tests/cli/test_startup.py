@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from anim.simulation.registry import SIMULATIONS
 from cli.command_table import COMMANDS
@@ -40,6 +41,17 @@ print(json.dumps(found))
 """
 NEVER = {"rich", "trimesh", "pygltflib", "numba", "matplotlib", "PIL", "png", "mujoco", "pxr", "dask"}
 HEAVY = NEVER | {"scipy", "meshopt"}
+FIXING = {"anim.check.fixing", "anim.optimization", "anim.operations.cubic_segments", "anim.gltf.meshopt"}
+WRITING = {"anim.gltf.writing.append", "anim.gltf.writing.buffers", "anim.gltf.writing.writer", "anim.files.atomic"}
+MEASURING = {"anim.measure.continuous_bound", "anim.measure.compare"}
+SHOWING = {"anim.show", "anim.exchange.formats", "anim.exchange.euler"}
+UNUSED = {  # by command line: modules of other options
+    "inspect biped.glb": FIXING | WRITING | MEASURING | SHOWING | {"anim.measure.loops.loop_analysis", "glob"},
+    "check biped.glb --select ALL": FIXING | WRITING | MEASURING | SHOWING,
+    "diff biped.glb biped.glb": WRITING | SHOWING | {"anim.caches.transforms", "anim.check"},
+    "resample biped.glb out.glb --fps 12": SHOWING | {"anim.check", "anim.caches"},
+    "bake biped.glb out.npz --clip walk": SHOWING | {"anim.check", "anim.measure.continuous_bound"},
+}
 STARTING = {"asyncio", "http", "multiprocessing", "unittest", "urllib.request", "xml"}
 
 
@@ -89,6 +101,15 @@ def test_a_run_imports_only_packages_that_it_uses(tmp_path: Path) -> None:
     assert not results[0][1] & (continuity | masked)
     assert results[7][1] >= continuity
     assert not _packages(results[-1][1]) & HEAVY
+
+
+@pytest.mark.parametrize("line", UNUSED)
+def test_a_plain_run_does_not_import_what_only_its_options_use(line: str, tmp_path: Path) -> None:
+    (tmp_path / "biped.glb").write_bytes(built("biped"))
+    words = [str(tmp_path / word) if "." in word else word for word in line.split()]
+    ((code, names),) = _run(words)
+    assert code == 0
+    assert not {name for name in names for prefix in UNUSED[line] if f"{name}.".startswith(f"{prefix}.")}
 
 
 def test_completion_of_commands_imports_none() -> None:

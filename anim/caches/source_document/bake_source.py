@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from anim.errors import RangeError
 from anim.gltf.document import Document, Json, json_array, node_label
-from anim.gltf.io import images
 from anim.gltf.io.source import Source
 from anim.gltf.reading.reader import depth_first
-from anim.gltf.writing.draco_decoding import decode_draco
 from anim.model import MeshPart, VertexCache
 
 BAKED_SUFFIX = " (baked)"  # of the names of new nodes
 Span = tuple[int, int]  # of vertices: first, last + 1
 
 
-@dataclass(frozen=True, slots=True)
-class BakeSource:
+class BakeSource(NamedTuple):
     """Source document of a bake: formats that store materials take them from it.
 
     clip: index of the baked animation, whose channels of other nodes stay; None for none. left_out: nodes whose meshes
@@ -33,8 +30,7 @@ class BakeSource:
     keep_skeleton: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class BakedMesh:
+class BakedMesh(NamedTuple):
     """A node with a baked mesh: its index, that of the mesh, and the vertices of each primitive in the cache.
 
     A primitive without vertices has an empty span.
@@ -78,6 +74,9 @@ def baked_meshes(cache: VertexCache, document: Document) -> tuple[BakedMesh, ...
 
 def self_contained(document: Document, source: Source | None, meshes: Collection[int]) -> Document:
     """Return a document with the images of its source inside, and meshes without Draco data."""
+    from anim.gltf.io import images  # `diff` only looks for bakes
+    from anim.gltf.writing.draco_decoding import decode_draco
+
     return images.embed(decode_draco(document, meshes), None if source is None else source.folder)
 
 

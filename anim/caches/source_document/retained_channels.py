@@ -38,7 +38,7 @@ def _is_retained(channel: Json, nodes: Collection[int], meshes: Mapping[int, int
     node, path, pointer = target
     if node is None:
         found = parse_weight_pointer(pointer)
-        return found is None or found.index in (meshes if found.owner == "nodes" else meshes.values())
+        return found is None or found.owner_index in (meshes if found.owner == "nodes" else meshes.values())
     return node not in baked if path == "weights" else node in nodes
 
 

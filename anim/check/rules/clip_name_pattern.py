@@ -9,9 +9,9 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameter, Parameters, Rule, TextParameter
 
-GODOT_LOOP = re.compile(r"^(loop|cycle)|(loop|cycle)$", re.IGNORECASE)  # gltf_document.cpp of Godot 4
+GODOT_LOOP = r"(?i)^(loop|cycle)|(loop|cycle)$"  # gltf_document.cpp of Godot 4
 
-CYCLE = re.compile(r"(^|[^a-z])(idle|walk|run|jog|sprint|crawl|swim|fly)(ing)?([^a-z]|$)", re.IGNORECASE)
+CYCLE = r"(?i)(^|[^a-z])(idle|walk|run|jog|sprint|crawl|swim|fly)(ing)?([^a-z]|$)"
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -21,10 +21,10 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         if pattern and not re.search(pattern, clip.name):
             yield file.in_clip(report.index, problem=f"its name does not match {pattern}")
         if parameters.target == "godot" and clip.end > clip.start:
-            is_named, is_closed = bool(GODOT_LOOP.search(clip.name)), _closes(file, report.seam_m, parameters)
+            is_named, is_closed = bool(re.search(GODOT_LOOP, clip.name)), _closes(file, report.seam_m, parameters)
             if is_named and not is_closed:
                 yield file.in_clip(report.index, problem="Godot loops it by its name, and it jumps at the end")
-            if is_closed and not is_named and CYCLE.search(clip.name):
+            if is_closed and not is_named and re.search(CYCLE, clip.name):
                 yield file.in_clip(report.index, problem="it ends as it starts, and Godot does not loop it by its name")
 
 

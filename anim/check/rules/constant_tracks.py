@@ -9,10 +9,7 @@ from anim.check.edits import edit_clips, keep_duration
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule, counted
 from anim.gltf.document import Document
-from anim.measure.inspect.track_statistics import stats
 from anim.model import Clip
-from anim.optimization.tracks.clip_ends import single_key
-from anim.sampling.batch import concatenate
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -28,6 +25,10 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _single_keys(clip: Clip, file: CheckedFile) -> Clip:
+    from anim.measure.inspect.track_statistics import stats
+    from anim.optimization.tracks.clip_ends import single_key  # only fixes import optimizations
+    from anim.sampling.batch import concatenate
+
     found = stats(concatenate(clip.tracks), file.skeleton)
     several = [len(each.times) > 1 + (each.in_tangents is not None) for each in clip.tracks]
     tracks = [

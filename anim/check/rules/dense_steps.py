@@ -46,7 +46,7 @@ def _is_stepped(table: TrackTable, steps: Floats, smallest: float) -> Bools:
     slow = ~jumps & (steps > STILL_PER_JUMP * smallest)
     adjacent = np.zeros_like(jumps)
     adjacent[1:] = jumps[1:] & jumps[:-1]
-    return np.asarray((table.count(jumps) >= MIN_JUMPS) & (table.count(slow | adjacent) == 0))
+    return np.asarray((table.count_marked(jumps) >= MIN_JUMPS) & (table.count_marked(slow | adjacent) == 0))
 
 
 def _steps(table: TrackTable) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from anim.model import Clip
 from anim.sampling.pose import sample_pose
 from anim.sampling.world import world_by_node
 
-FEET = re.compile(r"foot|toe|ankle|ball|paw|hoof", re.IGNORECASE)
+FEET = r"(?i)foot|toe|ankle|ball|paw|hoof"
 MAX_HEIGHT_PER_SIZE = 0.012  # of the figure's height, above the foot's lowest position
 MAX_RISE_PER_SIZE_S = 0.12  # of the figure's height per second, up or down
 MIN_CONTACT_S = 0.1
@@ -27,8 +27,7 @@ MIN_CONTACT_FRAMES = 4
 MIN_FPS, MAX_FPS, DEFAULT_FPS = 10.0, 60.0, 30.0
 
 
-@dataclass(frozen=True, slots=True)
-class Contact:
+class Contact(NamedTuple):
     """A foot on the ground: node, times (F,) in s, positions on the ground (F, 2) in m, and median velocity (2,)."""
 
     node: int
@@ -43,7 +42,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     The median velocity of all contacts is that of the ground: of a treadmill in clips that stay in place.
     """
     joints = file.joints or _animated(file)
-    feet = [joint for joint in _skinned(file) or joints if FEET.search(file.skeleton.names[joint])]
+    feet = [joint for joint in _skinned(file) or joints if re.search(FEET, file.skeleton.names[joint])]
     for report, clip in file.clips() if feet else ():
         height, contacts = _contacts(file, clip, joints, feet)
         if not contacts:

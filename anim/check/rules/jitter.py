@@ -19,7 +19,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of trembling tracks."""
     motion = rotation_steps(file)
     table, running = motion.table, _running(motion, parameters)
-    for clip, count in table.per_clip((table.count(running) > 0).astype(np.int64)):
+    for clip, count in table.per_clip((table.count_marked(running) > 0).astype(np.int64)):
         node, time_s = table.first_key(clip, running)
         yield file.in_clip(clip, count, time_s=time_s, node=node)
 

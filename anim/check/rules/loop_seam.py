@@ -18,7 +18,7 @@ from anim.measure.loops.joint_gaps import joint_gaps
 from anim.model import Clip
 from anim.units import format_number
 
-LOOP_NAME = re.compile(r"(^|[^a-z])(loop|cycle|idle)([^a-z]|$)", re.IGNORECASE)
+LOOP_NAME = r"(?i)(^|[^a-z])(loop|cycle|idle)([^a-z]|$)"
 BLEND_S = 0.1  # corrected before the end
 MIN_FPS = 20.0  # of the keys added there
 MIN_FRAMES = 2  # in it: the last one has the speed of the first one of the clip
@@ -28,8 +28,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with a small loop gap, and those that loop by name and don't."""
     for clip in file.facts.clips:
         size = clip.seam_m / file.diagonal if file.diagonal else 0.0
-        is_named = LOOP_NAME.search(clip.name) is not None
-        if size > parameters["gap"] and (size < parameters["limit"] or is_named) and clip.duration_s > 0:
+        is_near = size < parameters["limit"] or re.search(LOOP_NAME, clip.name) is not None
+        if is_near and size > parameters["gap"] and clip.duration_s > 0:
             gaps = joint_gaps(file.motion, *_ends(file, clip.index)) if clip.seam_measured_on == "skin" else []
             yield file.in_clip(clip.index, value=size, time_s=clip.end_s, node=gaps[0].node if gaps else None)
 

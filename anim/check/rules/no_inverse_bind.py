@@ -11,7 +11,6 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document, json_array
-from anim.gltf.writing.append import append_accessors
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -23,6 +22,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document with identity matrices."""
+    from anim.gltf.writing.append import append_accessors  # only fixes write
+
     document = file.document
     for each in found:
         count = len(document.json["skins"][each.number]["joints"])

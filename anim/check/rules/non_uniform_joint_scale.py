@@ -17,7 +17,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     joints = np.array([joint for joint in file.joints if file.skeleton.parents[joint] >= 0], np.int64)
     table = file.scales
     at_rest = joints[_is_spread(file.skeleton.scale[joints], parameters["spread"])]
-    animated = table.nodes[table.count(_is_spread(table.values, parameters["spread"])) > 0]
+    animated = table.nodes[table.count_marked(_is_spread(table.values, parameters["spread"])) > 0]
     for joint in sorted({*at_rest.tolist(), *animated[np.isin(animated, joints)].tolist()}):
         yield file.in_node(joint)
 

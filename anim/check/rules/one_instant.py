@@ -11,7 +11,6 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule, counted
 from anim.gltf.document import Document
 from anim.model import Clip
-from anim.optimization.tracks.clip_ends import extend
 
 DURATION_S = 1 / 30  # of a fixed clip
 
@@ -29,6 +28,8 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _last_one_frame(clip: Clip) -> Clip:
+    from anim.optimization.tracks.clip_ends import extend  # only fixes import optimizations
+
     first, *others = clip.tracks
     return replace(clip, tracks=(extend(first, clip.start, clip.start + DURATION_S), *others))
 

@@ -8,7 +8,6 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule, counted
 from anim.gltf.document import Document, json_array
-from anim.gltf.writing.removal import remove_animations
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -49,6 +48,8 @@ def _joints(file: CheckedFile, shown: set[int | None]) -> set[int | None]:
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document without these clips, and without their bytes."""
+    from anim.gltf.writing.removal import remove_animations  # only fixes write
+
     return remove_animations(file.document, {each.number for each in found})
 
 

@@ -14,8 +14,6 @@ from anim.check.influences import DRACO, edit_influences
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document, json_array
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.writing.append import append_accessors
-from anim.gltf.writing.removal import remove_unused_accessors
 from anim.measure.inspect.inspect import useful_joints
 
 
@@ -56,6 +54,9 @@ def _kept(file: CheckedFile, skin: int) -> list[int]:
 
 def _with_joints(file: CheckedFile, document: Document, skins: Mapping[int, list[int]]) -> Document:
     """The document with the joints of skins at these indices only, and their matrices."""
+    from anim.gltf.writing.append import append_accessors  # only fixes write
+    from anim.gltf.writing.removal import remove_unused_accessors
+
     about = [*document.json["skins"]]
     replaced = set()
     for skin, kept in skins.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Bytes, Document, Json
@@ -13,8 +13,7 @@ from anim.gltf.io.buffers import Resolve, buffers_of
 from anim.gltf.reading.node_matrix import expand_matrices
 
 
-@dataclass(frozen=True, slots=True)
-class BrokenFile:
+class BrokenFile(NamedTuple):
     """document: the valid parts. faults: errors in the rest, never empty.
 
     lost_clips, lost_skins: indices of those that cannot be read at all.

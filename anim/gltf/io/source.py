@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from anim.errors import FormatError
 from anim.files import resolver
@@ -21,8 +20,7 @@ Opener: TypeAlias = Callable[[Bytes, Resolve | None], Document]
 Note: TypeAlias = Callable[[str], object]
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(NamedTuple):
     """An input: document, label for messages, size with its .bin files, real folder, own bytes.
 
     folder: None for input from bytes, which has no other files.

@@ -12,8 +12,8 @@ from anim.errors import FormatError
 
 BUFFER_TYPES = ("application/octet-stream", "application/gltf-buffer")  # glTF 2.0, 3.6.1.1
 IMAGE_TYPES = ("image/png", "image/jpeg", "image/jpg", "image/webp")  # the third is invalid, but frequent
-_DATA = re.compile(r"data:([\w.+-]+/[\w.+-]+)?((?:;[\w.+-]+=[^;,]*)*)(;base64)?,", re.ASCII | re.IGNORECASE)
-_SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.ASCII | re.IGNORECASE)
+_DATA = r"(?ai)data:([\w.+-]+/[\w.+-]+)?((?:;[\w.+-]+=[^;,]*)*)(;base64)?,"
+_SCHEME = r"(?ai)[a-z][a-z0-9+.-]*:"
 
 
 def is_data(uri: str) -> bool:
@@ -27,7 +27,7 @@ def decode_data(uri: str, types: Sequence[str] = BUFFER_TYPES) -> bytes:
     types: allowed media types; glTF's for buffers. Raises FormatError for an invalid URI, or another type.
     decode_data("data:application/octet-stream;base64,AAE=") → b"\\0\\1"
     """
-    match = _DATA.match(uri)
+    match = re.match(_DATA, uri)
     if match is None:
         raise FormatError(f"broken data URI ({_short(uri)})")
     media = (match[1] or "").lower()
@@ -57,12 +57,12 @@ def relative_path(uri: str) -> str:
     Raises FormatError unless the path is in the file's folder: no scheme, no absolute path, no ".." that leads out.
     relative_path("walk%20data.bin") → "walk data.bin"; relative_path("a/../walk.bin") → "walk.bin"
     """
-    if _SCHEME.match(uri):
+    if re.match(_SCHEME, uri):
         raise FormatError(f"URI '{_short(uri)}' has a scheme (only files beside this one are read)")
     path = unquote(_without_dot_segments(uri), errors="surrogateescape")
     if not path or "\0" in path or not _is_encodable(path):
         raise FormatError(f"URI '{_short(uri)}' names no file")
-    if path[0] in "/\\" or _SCHEME.match(path):
+    if path[0] in "/\\" or re.match(_SCHEME, path):
         raise FormatError(f"URI '{_short(uri)}' is absolute (only files beside this one are read)")
     if ".." in re.split(r"[/\\]", path):
         raise FormatError(f"URI '{_short(uri)}' leaves the file's folder (only files beside this one are read)")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,8 +191,7 @@ def _slice(data: Bytes, place: Json) -> Bytes:
     return data[start : start + place["byteLength"]]
 
 
-@dataclass(frozen=True, slots=True)
-class ElementLayout:
+class ElementLayout(NamedTuple):
     """Memory layout of one element: columns of `rows` values, `column` bytes per column."""
 
     dtype: np.dtype[Any]

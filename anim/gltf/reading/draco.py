@@ -6,8 +6,7 @@ Data is decoded only on use: documents are written with their original Draco byt
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,7 @@ from anim.gltf.reading.accessors import DTYPES, Accessors
 from anim.gltf.validation.buffer_layout import COMPONENTS, DRACO
 
 
-@dataclass(frozen=True, slots=True)
-class DracoMesh:
+class DracoMesh(NamedTuple):
     """Decoded Draco data: arrays (V, C) by unique id, and faces (T, 3)."""
 
     attributes: Mapping[int, NDArray[Any]]

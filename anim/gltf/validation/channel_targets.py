@@ -11,7 +11,7 @@ from anim.model import parse_weight_pointer
 from anim.model.track import PATHS
 
 EXTENSION = "KHR_animation_pointer"
-_NODE_PROPERTY = re.compile(r"/nodes/(0|[1-9][0-9]{0,8})/(translation|rotation|scale|weights)")
+_NODE_PROPERTY = r"/nodes/(0|[1-9][0-9]{0,8})/(translation|rotation|scale|weights)"
 
 Target: TypeAlias = tuple[int | None, str, str | None]  # node, path, pointer
 
@@ -89,5 +89,5 @@ def _pointer_target(extension: object) -> Target | None:
     pointer = extension.get("pointer") if isinstance(extension, dict) else None
     if not isinstance(pointer, str):
         return None
-    match = _NODE_PROPERTY.fullmatch(pointer)
+    match = re.fullmatch(_NODE_PROPERTY, pointer)
     return (int(match[1]), match[2], pointer) if match else (None, "pointer", pointer)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from anim.errors import FormatError
@@ -12,13 +11,15 @@ Check: TypeAlias = Callable[[Any], None]
 MAX_NUMBER = 3.4e38  # near float32's maximum
 
 
-@dataclass(frozen=True, slots=True)
 class ObjectRule:
     """Rule for an object: a check per property, required properties, and a check of the object."""
 
-    properties: Mapping[str, Check]
-    required: tuple[str, ...] = ()
-    whole: Check | None = None
+    def __init__(
+        self, properties: Mapping[str, Check], required: tuple[str, ...] = (), whole: Check | None = None
+    ) -> None:
+        self.properties = properties
+        self.required = required
+        self.whole = whole
 
     def __call__(self, value: Any) -> None:
         if type(value) is not dict:

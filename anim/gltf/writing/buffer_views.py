@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ TYPICAL_OFFSET_BYTES = 10_000  # typical offset or length, to estimate the cost 
 PLAIN_VIEW_JSON_BYTES = 50  # JSON bytes of the plain view
 
 
-@dataclass(frozen=True, slots=True)
-class View:
+class View(NamedTuple):
     """A new view: the bytes to store, and their decoded layout.
 
     length: decoded bytes. stride: bytes per element of a compressed stream, 0 for a plain view.
@@ -39,16 +38,14 @@ class View:
         return {**_at(decoded), "byteLength": self.length, "extensions": {extension: stream}}
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(NamedTuple):
     """New views, and for each content (view index, byte offset)."""
 
     views: tuple[View, ...]
     places: tuple[tuple[int, int], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Stream:
+class _Stream(NamedTuple):
     """A view under construction, and its contents in order."""
 
     view: View

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from anim.gltf.writing.references import References
 MIN_FREED_BYTES = 4  # bytes of an otherwise empty buffer: glTF requires at least one
 
 
-@dataclass(frozen=True, slots=True)
-class RebuiltBuffers:
+class RebuiltBuffers(NamedTuple):
     """Buffers after the change.
 
     described: their JSON. views: JSON of the new views. shift: new byte offsets of each old buffer.

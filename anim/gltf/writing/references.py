@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from anim.gltf.document import Json, json_array
 
@@ -27,8 +26,7 @@ _CONTAINERS = (dict, list)  # of JSON
 _Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its parent's, and its key or index there
 
 
-@dataclass(frozen=True, slots=True)
-class References:
+class References(NamedTuple):
     """Indices of accessors and views with references outside the replaced animations.
 
     frozen_buffers: those that unknown extensions refer to directly: their bytes must not move.

@@ -9,7 +9,7 @@ matrices.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ from anim.sampling import rest_pose
 from anim.sampling.world import local_by_node
 
 
-@dataclass(frozen=True, slots=True)
-class Correspondence:
+class Correspondence(NamedTuple):
     """Correspondence of two scenes.
 
     nodes: (N,) for each node of the first scene its index in the second, −1 without one.
@@ -160,7 +159,7 @@ class _SceneMatcher:
         )
         bind = np.broadcast_to(mesh_space.IDENTITY if space is None else space, surface.bind.shape)
         found = Binding(np.full(len(surface.nodes), bare.node, np.int64), bind, bare.node, surface.rest_weights)
-        return replace(found, rest_weights=bare.weights) if len(bare.weights) == len(surface.rest_weights) else found
+        return found._replace(rest_weights=bare.weights) if len(bare.weights) == len(surface.rest_weights) else found
 
     def _choices(self, number: int, instance: MeshInstance) -> list[MeshInstance]:
         """Candidates for an instance in the other scene: on the same node, of the same name, in order."""
@@ -177,8 +176,8 @@ class _SceneMatcher:
             found = self._skinned(surface, instance.skin, instance, partner)
         morphing = partner or self._on_node.get(int(self.nodes[instance.node])) or self._below(instance)
         if morphing is None or len(morphing.weights) != len(surface.rest_weights):
-            return replace(found, owner=int(self.nodes[instance.node]))
-        return replace(found, owner=morphing.node, rest_weights=morphing.weights)
+            return found._replace(owner=int(self.nodes[instance.node]))
+        return found._replace(owner=morphing.node, rest_weights=morphing.weights)
 
     def by_nodes(self, surface: Surface) -> Binding:
         """Joints of a surface without a partner, from the correspondence of nodes alone."""

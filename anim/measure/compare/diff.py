@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ END_TOLERANCE_S = 1e-6  # smaller differences of clip ends come from rounding
 MAX_LISTED = 3  # names in a sentence
 
 
-@dataclass(frozen=True, slots=True)
-class ClipDiff:
+class ClipDiff(NamedTuple):
     """Difference of two corresponding clips.
 
     old, new: their indices in the files. certified: m, upper bound of the error at all times; None if it could not be
@@ -45,8 +44,7 @@ class ClipDiff:
     added: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Diff:
+class Diff(NamedTuple):
     """Two files.
 
     diagonal: m, of the old scene's bounding box. clips: worst first. missing_clips, added_clips: numbers of those that
@@ -168,7 +166,7 @@ def _compare_pairs(
     found: list[ClipDiff] = []
     for n, (i, j) in enumerate(pairs):
         if first[n] < n:
-            found.append(replace(found[first[n]], old=i, new=j, name=old[i].name, new_name=new[j].name))
+            found.append(found[first[n]]._replace(old=i, new=j, name=old[i].name, new_name=new[j].name))
         else:
             found.append(_compare_clips(prover, (i, old[i]), (j, new[j]), player=player, fps=fps))
     return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from anim.arrays import Bools, Floats
@@ -17,9 +15,9 @@ def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic:
     is_cubic: (U,). h: (G, 1) s.
     """
     own, most_own, own_rate = np.zeros_like(found.value), np.zeros_like(found.size), np.zeros_like(found.size)
-    whole = replace(found, own=own, max_residual=most_own, residual_rate=own_rate)
+    whole = found._replace(own=own, max_residual=most_own, residual_rate=own_rate)
     part = on_cubics(value[..., is_cubic], cubic[0][..., is_cubic], cubic[1][..., is_cubic], h)
-    for name in QuaternionBounds.__slots__:
+    for name in QuaternionBounds._fields:
         getattr(whole, name)[..., is_cubic] = getattr(part, name)
     return whole
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from anim.model import Interpolation
 from anim.sampling.batch import Batch
 
 
-@dataclass(frozen=True, slots=True)
-class Endpoints:
+class Endpoints(NamedTuple):
     """Values, slopes, second derivatives (per s, s²) of U vectors at ends of G intervals, (2, C, G, U).
 
     Within an interval the third derivative is constant: a line or a cubic.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,7 @@ from anim.measure.error.point_groups import Binding, PointGroups, SkinnedGroups
 from anim.measure.error.shell_points import ShellPoints
 
 
-@dataclass(frozen=True, slots=True)
-class Morphing:
+class Morphing(NamedTuple):
     """Displacement of one surface's points by morph weights.
 
     owners: the nodes with the weights in both versions. rest: (2, M) weights without a track.
@@ -26,8 +25,7 @@ class Morphing:
     targets: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class InfluenceRadius:
+class InfluenceRadius(NamedTuple):
     """Bounds of the points of one surface by J joints.
 
     nodes: (J,). arms: (J,) m, largest distance of a point with influence from the joint in its own space; of a morphed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from anim.model import Clip, Scene
 from anim.sampling.weight_pointers import resolve_weight_pointers
 
 
-@dataclass(frozen=True, slots=True)
-class IntervalRise:
+class IntervalRise(NamedTuple):
     """Bounds for C groups between each of F times and the next (C, F − 1), in m; inf if unknown.
 
     rise: excess of displacements over the larger one of both ends. jump: excess of the displacement just before the

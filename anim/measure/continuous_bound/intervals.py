@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,8 +53,7 @@ class Intervals:
         return np.clip(np.searchsorted(self.edges, at, side="right") - 1, 0, max(len(self) - 1, 0))
 
 
-@dataclass(frozen=True, slots=True)
-class IntervalKeys:
+class IntervalKeys(NamedTuple):
     """Intervals on the keys of one time axis.
 
     left, right: (G,) keys of the segment. start, end: (G,) interpolation parameters, both 0 outside the keys. duration:

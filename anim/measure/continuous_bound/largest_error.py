@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
@@ -11,8 +11,7 @@ from anim.measure.error.sample_times import cut_times
 from anim.model import Clip, Interpolation
 
 
-@dataclass(frozen=True, slots=True)
-class Spacing:
+class Spacing(NamedTuple):
     """Spacing of the first samples. parts: least number between keys. step: s, largest distance.
 
     longest: s, as for `Prover.certified`.

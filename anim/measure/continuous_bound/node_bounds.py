@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ from anim.sampling.batch import Batch
 UNIT_TOLERANCE = 1e-6  # of |q|²: up to this, players with and without normalization agree
 
 
-@dataclass(frozen=True, slots=True)
-class NodeBounds:
+class NodeBounds(NamedTuple):
     """Majorants of N nodes in G intervals, local or world: of matrices and of origins, in m, (3, 2, N, G).
 
     jumps: (1 or 2, N, G), upper bounds of both versions' jumps of matrices and origins at the end of an interval.

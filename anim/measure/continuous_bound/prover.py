@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ LARGE_STEP_FRACTION = 0.125
 BLOCK = 1_000_000  # players × intervals × groups and nodes per step, each about 100 bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Proof:
+class Proof(NamedTuple):
     """Upper bound over all times of a clip.
 
     bound: m, of the displacement of any vertex at any time, except for rounding; None if unproven.
@@ -38,8 +37,7 @@ class Proof:
     player: str
 
 
-@dataclass(frozen=True, slots=True)
-class ProofTarget:
+class ProofTarget(NamedTuple):
     """Target of a proof. found: m, largest distance so far. slack: m, largest excess of the bound over it."""
 
     found: float
@@ -107,7 +105,7 @@ class Prover:
             found = self.ruler.error_at(before, after, np.array([seen.time]), player=seen.player)
             pointers, pointer = worst.max_pointer_error, worst.pointer
             player = seen.player
-            worst = replace(found, times=worst.times + 1, max_pointer_error=pointers, pointer=pointer)
+            worst = found._replace(times=worst.times + 1, max_pointer_error=pointers, pointer=pointer)
         bound = max(bound, worst.max_error)
         return Proof(bound if np.isfinite(bound) else None, worst, player)
 

@@ -7,7 +7,7 @@ line |c|²|q′| is constant, and ρ′ = λ − ρ².
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from anim.arrays import Bools, Floats
 MIN_MIX_LENGTH = 1e-3  # length of a mix; shorter ones have no reliable direction
 
 
-@dataclass(frozen=True, slots=True)
-class QuaternionBounds:
+class QuaternionBounds(NamedTuple):
     """Quaternions of P players, G intervals and U nodes; every value (P, G, U) unless noted.
 
     value, slope: (2, 4, P, G, U), q and q′ at both ends. size, speed: bounds of |q| and |q′|. lambda_: (2, P, G, U), λ
@@ -47,8 +46,7 @@ class QuaternionBounds:
         return np.asarray(self.max_lambda * self.size + 2 * self.max_rho * self.speed + self.max_residual)
 
 
-@dataclass(frozen=True, slots=True)
-class ArcMix:
+class ArcMix(NamedTuple):
     """Mixes c that are known at both ends of intervals. value, slope: (2, 4, P, G, U), c and c′.
 
     square, along, rate: (2, P, G, U), |c|², c·c′, |c′|².
@@ -62,11 +60,10 @@ class ArcMix:
 
     def part(self, players: slice) -> ArcMix:
         """Return the same of some players."""
-        return ArcMix(*(getattr(self, name)[..., players, :, :] for name in ArcMix.__slots__))
+        return ArcMix(*(each[..., players, :, :] for each in self))
 
 
-@dataclass(frozen=True, slots=True)
-class ChordBounds:
+class ChordBounds(NamedTuple):
     """A mix on a line, scaled to length 1 at an interval's start; (P, G, U), or (2, P, G, U) at both ends.
 
     square: |c|², along: c·c′, rate: |c′|². wedge: (|c|²|q′|)², which is constant. nearest, farthest: the smallest and
@@ -82,7 +79,7 @@ class ChordBounds:
 
     def part(self, players: slice) -> ChordBounds:
         """Return the same of some players."""
-        return ChordBounds(*(getattr(self, name)[..., players, :, :] for name in ChordBounds.__slots__))
+        return ChordBounds(*(each[..., players, :, :] for each in self))
 
 
 def arc_mix(value: Floats, slope: Floats) -> ArcMix:
@@ -130,7 +127,7 @@ def nlerp_bounds(of: ArcMix, chord: ChordBounds) -> QuaternionBounds:
 
 def select_bounds(into: QuaternionBounds, part: QuaternionBounds, players: slice, where: Bools) -> None:
     """Write the bounds of some players into those of all. where: (P', G, U), mask of the part's."""
-    for name in QuaternionBounds.__slots__[:11]:
+    for name in QuaternionBounds._fields[:11]:
         np.copyto(getattr(into, name)[..., players, :, :], getattr(part, name), where=where)
 
 

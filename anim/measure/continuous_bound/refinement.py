@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,7 @@ from anim.model import Clip
 MAX_PARTS = 128  # maximum number of subintervals between two times
 
 
-@dataclass(frozen=True, slots=True)
-class Subintervals:
+class Subintervals(NamedTuple):
     """Intervals between neighboring samples, divided into equal parts, for one player.
 
     times: (T,) s, ends of parts; the last of an interval is the moment before its end. more: (C, T) m, upper
@@ -38,8 +38,7 @@ class Subintervals:
         return Subintervals(self.player, self.times[here], self.more[:, here], self.tops[:, here], self.interval[here])
 
 
-@dataclass(frozen=True, slots=True)
-class RefinedMaximum:
+class RefinedMaximum(NamedTuple):
     """The largest sampled displacement in m, its player, and its time in s."""
 
     largest: float = 0.0

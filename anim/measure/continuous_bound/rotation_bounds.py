@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from anim.arrays import Bools, Floats
@@ -46,7 +44,7 @@ def _on_the_side_of(first: RotationEndpoints, second: RotationEndpoints) -> Rota
     """The second version with signs like the first's: q and −q are one rotation."""
     sign = np.where((first.value[0] * second.value[0]).sum(axis=0) < 0, -1.0, 1.0)
     cubic = None if second.cubic is None else second.cubic * sign
-    return replace(second, value=second.value * sign, cubic=cubic)
+    return second._replace(value=second.value * sign, cubic=cubic)
 
 
 def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:

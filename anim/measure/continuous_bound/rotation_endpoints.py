@@ -7,7 +7,7 @@ unchanged or normalized.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from anim.sampling.batch import Batch
 from anim.sampling.players import GLTF, PLAYERS, is_divided
 
 
-@dataclass(frozen=True, slots=True)
-class RotationEndpoints:
+class RotationEndpoints(NamedTuple):
     """Mixes of P players, in G intervals, of U nodes.
 
     value: (2, 4, P, G, U), at both ends. turn: (P, G, U) rad, ν times the interval's length; 0 on lines and cubics.
@@ -37,8 +36,7 @@ class RotationEndpoints:
     is_cubic: Bools
 
 
-@dataclass(frozen=True, slots=True)
-class _Keys:
+class _Keys(NamedTuple):
     """Keys of tracks in G intervals and U nodes.
 
     keys: (2, 4, G, U), the stored keys on both sides. shares: (2, G, U) interpolation parameters at both ends of

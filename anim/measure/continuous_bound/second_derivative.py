@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from anim.measure.continuous_bound.node_bounds import NodeBounds
 from anim.measure.continuous_bound.track_partition import ClipVersion
 
 
-@dataclass(frozen=True, slots=True)
-class SecondDerivativeBound:
+class SecondDerivativeBound(NamedTuple):
     """Bounds for points of C groups in G intervals, each (C, G).
 
     bend: m/s², the second derivative of the displacement. jump: m, its jump at the interval's end.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +13,7 @@ from anim.model import Clip, Scene, Skeleton, TimeAxis
 from anim.sampling.batch import Batch, batches
 
 
-@dataclass(frozen=True, slots=True)
-class ClipVersion:
+class ClipVersion(NamedTuple):
     """One version: nodes at rest, tracks of nodes that move in either, constant tracks with one key each.
 
     All stacked.

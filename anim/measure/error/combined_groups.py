@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -74,12 +73,12 @@ class CombinedGroups:
     def vertex(self, found: MaxDisplacement) -> int:
         """Return the index in its mesh of the vertex that was found, −1 for none."""
         part, first = self._part(found.group)
-        return part.vertex(replace(found, group=found.group - first))
+        return part.vertex(found._replace(group=found.group - first))
 
     def name_of(self, found: MaxDisplacement) -> str:
         """Return the name of the surface of what was found; empty for shells."""
         part, first = self._part(found.group)
-        return part.name_of(replace(found, group=found.group - first))
+        return part.name_of(found._replace(group=found.group - first))
 
     def _part(self, group: int) -> tuple[SkinnedGroups | ShellPoints, int]:
         """The part of a group, and the index of its first group."""
@@ -103,8 +102,8 @@ def _bound(part: SkinnedGroups | ShellPoints) -> BoundGroups:
     bound = part.bound_groups
     missing = NUM_CORNERS - bound.corners.shape[1]
     if missing <= 0 or not len(bound.corners):
-        return replace(bound, corners=bound.corners.reshape(-1, NUM_CORNERS, 3))
-    return replace(bound, corners=np.concatenate((bound.corners, bound.corners[:, :missing]), axis=1))
+        return bound._replace(corners=bound.corners.reshape(-1, NUM_CORNERS, 3))
+    return bound._replace(corners=np.concatenate((bound.corners, bound.corners[:, :missing]), axis=1))
 
 
 def _nodes(part: SkinnedGroups | ShellPoints, version: int) -> Ints:

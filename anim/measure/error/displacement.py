@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -36,8 +35,7 @@ class DisplacementField(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class BoundGroups:
+class BoundGroups(NamedTuple):
     """Vertices in groups, as products in which displacements by joint matrices are linear.
 
     reach: indices of the joints that influence each group. products: (V_g, J_g · 4) of each group: skin weight
@@ -171,8 +169,7 @@ class DisplacementRate:
         return self._field.joint(group, frame + 1, vertex)
 
 
-@dataclass(frozen=True, slots=True)
-class MaxDisplacement:
+class MaxDisplacement(NamedTuple):
     """The longest vector of a field. vertex: index in the group, −1 if only the bound was evaluated.
 
     limits: (G, F), the field's own; where vertices were evaluated, at most the longest of them.
@@ -233,7 +230,7 @@ def max_displacement(field: DisplacementField, *, floor: float, slack: float, mo
                 found = MaxDisplacement(length, group, int(frames[column]), int(vertex), found.limits)
             most -= lengths_here.size
             size = max(min(2 * size, CHUNK // max(len(lengths_here), 1)), 1)
-    return found if left <= found.length else replace(found, length=left)
+    return found if left <= found.length else found._replace(length=left)
 
 
 def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:

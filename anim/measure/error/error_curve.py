@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,16 +15,14 @@ from anim.model import Clip
 JOINTS = 4  # number of worst joints with a curve of their own
 
 
-@dataclass(frozen=True, slots=True)
-class JointErrorCurve:
+class JointErrorCurve(NamedTuple):
     """Error of one joint: the largest displacement (F,) m of a vertex with its largest weight on it."""
 
     joint: str
     error: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class ErrorCurve:
+class ErrorCurve(NamedTuple):
     """Error of one clip. times: (F,) s. error: (F,) m, the largest of any vertex. joints: worst first."""
 
     name: str

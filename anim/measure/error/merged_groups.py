@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from anim.measure.error.reduced_skeleton import IDENTITY, ReducedSkeleton
 from anim.measure.error.surface import Surface
 
 
-@dataclass(frozen=True, slots=True)
-class RigidPoints:
+class RigidPoints(NamedTuple):
     """Points (V, 3) of a mesh, or around a node, in the space of the kept node that they follow."""
 
     name: str
@@ -96,16 +95,14 @@ def merge_shells(nodes: Ints, points: Floats, names: Sequence[str], skeleton: Re
 def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton) -> tuple[Surface, Binding | None]:
     """A surface on kept nodes, and its joints in the second version if they differ."""
     anchors, offsets = skeleton.anchors, skeleton.offsets
-    old = replace(
-        surface,
+    old = surface._replace(
         nodes=anchors[surface.nodes],
         bind=matrix.multiply(offsets[surface.nodes], surface.bind),
         owner=int(anchors[surface.owner]),
     )
     if binding is None:
         return old, None
-    new = replace(
-        binding,
+    new = binding._replace(
         nodes=anchors[binding.nodes],
         bind=matrix.multiply(offsets[binding.nodes], binding.bind),
         owner=int(anchors[binding.owner]),

@@ -7,8 +7,8 @@ the length of a clip.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import starmap
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,7 @@ MAX_SEARCHED = 40_000_000  # vertices per surface and block; if there are more, 
 BLOCK = 40_000  # matrices of nodes per block, each about 600 bytes with derived values
 
 
-@dataclass(frozen=True, slots=True)
-class MotionError:
+class MotionError(NamedTuple):
     """The largest distance between two versions of a clip.
 
     max_error: m, upper bound at the sampled times. time: s. place: the mesh or node. joint: the joint with the largest
@@ -56,8 +55,7 @@ class MotionError:
     vertex: int = -1
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(NamedTuple):
     """Some of the times (F,) in s, with the poses of both versions."""
 
     times: Floats
@@ -65,8 +63,7 @@ class Block:
     new: PosedSkeleton
 
 
-@dataclass(frozen=True, slots=True)
-class ErrorSamples:
+class ErrorSamples(NamedTuple):
     """Errors at some times (F,), in one or several players.
 
     error, player: the largest, and the player with it. block: the poses, if they are those of one player and one block.

@@ -7,7 +7,7 @@ over the boxes around p and t; the change from frame to frame is bounded in the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from anim.measure.error.displacement import largest_over
 SIDES = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])  # signs of a box's corners
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(NamedTuple):
     """Both versions over time: matrices `moved` = A − B and `after` = A (J, F, 3, 4), weights (F, M)."""
 
     moved: Floats
@@ -27,8 +26,7 @@ class Change:
     new: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class MorphBounds:
+class MorphBounds(NamedTuple):
     """Boxes of one surface.
 
     corners: (J, 8, 3) around the vertices of each joint. extents: (M, 3), the largest displacement of each target along

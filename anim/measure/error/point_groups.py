@@ -8,8 +8,7 @@ that one product of matrices computes it for many vertices and times.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,8 +27,7 @@ from anim.model import Pose
 from anim.sampling.pose import PosedSkeleton
 
 
-@dataclass(frozen=True, slots=True)
-class Binding:
+class Binding(NamedTuple):
     """Joints of a surface in one version of the scene.
 
     nodes: (J,) the joints, −1 for the world itself. bind: (J, 3, 4) joint_from_mesh.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,7 @@ MAX_MOVING_FRACTION = 0.5  # of the nodes, in a skeleton that is reduced
 IDENTITY = np.eye(4)[None, :3]
 
 
-@dataclass(frozen=True, slots=True)
-class ReducedSkeleton:
+class ReducedSkeleton(NamedTuple):
     """The nodes that move in two versions of a skeleton of the same hierarchy, in their order, then the world's origin.
 
     Parents of moving nodes that do not move themselves are kept too, with their matrix below the next moving node.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ SLACK = 1.01  # factor: the speed error is at most this much above the true one
 SPEED_TOLERANCE = 1e-6  # diagonals per second; smaller speed errors are not searched
 
 
-@dataclass(frozen=True, slots=True)
-class Peak:
+class Peak(NamedTuple):
     """A maximum: its size, time (s) and position: mesh or node, joint, vertex or −1."""
 
     size: float = 0.0
@@ -35,8 +34,7 @@ class Peak:
     vertex: int = -1
 
 
-@dataclass(frozen=True, slots=True)
-class Statistics:
+class Statistics(NamedTuple):
     """Errors between two versions of a clip besides the largest distance.
 
     mean, p99: m, over all vertices at up to 64 of the times, evenly chosen (fewer for very large meshes).

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from anim.sampling import rest_world
 SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's diagonal
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(NamedTuple):
     """Vertices with one set of joints.
 
     name: of the mesh or node, for reports. nodes: (J,) the joints, or the one node of a rigid mesh.

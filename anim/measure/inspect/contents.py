@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from anim.errors import AnimError
 from anim.gltf.document import Document, json_array
@@ -12,8 +12,7 @@ from anim.gltf.reading.accessors import Accessors
 from anim.model import Clip, Scene, Skeleton
 
 
-@dataclass(frozen=True, slots=True)
-class FileContents:
+class FileContents(NamedTuple):
     """Parts of a file that can be read. file_bytes: size of the file, for fractions of it.
 
     clips: by index. scene: None if vertices can't be read, for scene_error. faults: reasons for which other commands

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,7 @@ GRID_TOLERANCE_FRAMES = 0.02  # frames; key times that exporters store as float3
 MIN_REGULAR_FRACTION = 0.98  # minimum fraction of keys on the grid of a rate
 
 
-@dataclass(frozen=True, slots=True)
-class FrameRate:
+class FrameRate(NamedTuple):
     """Estimated frame rate. fps: the estimate. regular: fraction of keys on its grid, 0 … 1."""
 
     fps: float

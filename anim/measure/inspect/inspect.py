@@ -44,8 +44,9 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
     costs, cost = storage_cost.storage_costs(document)
     stored_bytes = min(stored(document), cost.data)
     packed = stored_bytes / cost.data if cost.data else 1.0
+    counts = (counted.of_tracks(slice(ends[n], ends[n + 1])) for n in range(len(looked_at)))
     measured = (
-        _clip(clip, ways[n], seams[n], measured_on, skeleton, counted[ends[n] : ends[n + 1]], tracks=tracks)
+        _clip(clip, ways[n], seams[n], measured_on, skeleton, next(counts), tracks=tracks)
         for n, clip in enumerate(looked_at)
     )
     reports: list[ClipReport] = []
@@ -149,7 +150,7 @@ def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
         return counted
     redundant = counted.redundant.copy()
     redundant[min(at_end, key=lambda i: redundant[i])] -= 1
-    return replace(counted, redundant=redundant)
+    return counted._replace(redundant=redundant)
 
 
 def _splines(clip: Clip) -> Bools:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from anim.errors import AnimError
 
 
-@dataclass(frozen=True, slots=True)
-class TrackReport:
+class TrackReport(NamedTuple):
     """One track: its target, keys, and statistics (see `track_statistics`)."""
 
     target: str
@@ -90,8 +90,7 @@ class SkinReport:
     worst_sum_error: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Facts:
+class Facts(NamedTuple):
     """Report on a file.
 
     animation_*_bytes: values decoded, values as stored, and JSON; data shared by clips counts once.

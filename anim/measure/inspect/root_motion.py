@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +17,7 @@ from anim.sampling.world import world_by_node
 MIN_DISPLACEMENT_PER_PATH = 0.7
 
 
-@dataclass(frozen=True, slots=True)
-class RootMotion:
+class RootMotion(NamedTuple):
     """Displacement of a clip's root from start to end.
 
     root: index of the node, −1 if no translation changes. distance: m. speed: m/s.

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json as jsonlib
 from collections import Counter
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing.references import views_of
 
 
-@dataclass(frozen=True, slots=True)
-class StorageCost:
+class StorageCost(NamedTuple):
     """Bytes of stored values (compressed: decoded), and of JSON: channels, samplers, accessors, views."""
 
     data: int

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,7 @@ MAX_INTEGERS = {
 WIDE_STEP_RAD = np.radians(170.0)  # rad; from here on players disagree on the shorter arc
 
 
-@dataclass(frozen=True, slots=True)
-class TrackStats:
+class TrackStats(NamedTuple):
     """Statistics of T tracks; arrays (T,).
 
     constant: never changes. no_effect: constant, and equal to the rest pose. redundant: keys whose removal saves bytes
@@ -46,9 +45,9 @@ class TrackStats:
     wide: Ints
     widest: Floats
 
-    def __getitem__(self, part: slice) -> TrackStats:
+    def of_tracks(self, part: slice) -> TrackStats:
         """Return the statistics of some of the tracks."""
-        return TrackStats(*(getattr(self, each.name)[part] for each in fields(self)))
+        return TrackStats._make(each[part] for each in self)
 
 
 def stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> TrackStats:

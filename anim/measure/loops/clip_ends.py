@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,8 +33,7 @@ WITHOUT_FRAME = DIFFERENCES[:2, TIMES_WITHOUT_FRAME]  # for ranges without motio
 STEP_TIME_INDEX = [0, 1, 1, 3, 4, 6, 6, 7]  # times of STEP tracks for each column: they have no velocity
 
 
-@dataclass(frozen=True, slots=True)
-class LoopRange:
+class LoopRange(NamedTuple):
     """Time range of a clip that is played as a loop.
 
     start, end: s, start ≤ end. frame: s, duration of a frame, 0 if motion per frame is not needed.
@@ -63,8 +62,7 @@ class LoopRange:
         return np.concatenate((self.start + after, self.end - after[::-1]))
 
 
-@dataclass(frozen=True, slots=True)
-class EndPoses:
+class EndPoses(NamedTuple):
     """A range at the T times of DIFFERENCES.
 
     world: (N, T, 3, 4). weights: (T, M) by node, of morphing meshes.

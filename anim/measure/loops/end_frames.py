@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.joint_gaps import moving_nodes
-from anim.measure.loops.loop_analysis import (
+from anim.measure.loops.loop_criteria import (
     NOISE_PER_SIZE,
     VISIBLE_GAP_PER_SIZE,
     are_few,
@@ -34,8 +34,7 @@ class EndFrameKind(StrEnum):
     DUPLICATE = "duplicate"
 
 
-@dataclass(frozen=True, slots=True)
-class EndFrame:
+class EndFrame(NamedTuple):
     """Last frame of a loop that is missing or duplicate. duration: of a frame, in s. gap: loop gap in m."""
 
     kind: EndFrameKind

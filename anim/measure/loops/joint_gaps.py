@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from anim.model import Clip, Pose
 from anim.sampling.pose import sample_pose
 
 
-@dataclass(frozen=True, slots=True)
-class JointGap:
+class JointGap(NamedTuple):
     """A joint with its own loop gap. joint: its name. node: its index.
 
     gap: m, the largest distance that any vertex would move if this joint alone ended as it starts.

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.inspect import frame_rate
 from anim.measure.loops.clip_ends import LoopRange
-from anim.measure.loops.joint_gaps import JointGap, joint_gaps, moving_nodes
+from anim.measure.loops.joint_gaps import JointGap, moving_nodes
+from anim.measure.loops.loop_criteria import (
+    NOISE_PER_SIZE,
+    VISIBLE_GAP_PER_SIZE,
+    are_few,
+    frame_duration,
+    is_one_frame,
+    loop_frame_rate,
+    open_joints,
+)
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip
 from anim.sampling.pose import sample_pose
 from anim.sampling.world import world_by_node
 
-NOISE_PER_SIZE = 1e-5  # of the model's size; smaller gaps are rounding
-VISIBLE_GAP_PER_SIZE = 1e-3  # of the model's size; larger gaps are visible
 INVISIBLE_GAP_PER_FRAME = 0.1  # of the usual motion per frame: a gap between those two is visible above this
-MAX_MISSING_FRAMES = 1.6  # gap of a clip open by one frame, relative to the motion per frame next to it
 MAX_COUNT = 10**12  # frames that indices in float64 tell apart
 MAX_FRAMES = 600  # frames that `best_ranges` compares
 MAX_STEPS = 300  # pairs of frames, and keys, that are measured inside a clip
 MIN_INTERIOR_S = 2e-4  # s, from an end to a key inside
-DEFAULT_FPS = 30.0
-MIN_REGULAR_FRACTION = 0.9  # of the keys, on the frames of a rate
 
 
 class LoopKind(StrEnum):
@@ -148,22 +150,6 @@ def _open_kind(seam: Seam, size: float, inside: float, *, few: bool) -> LoopKind
     return LoopKind.OPEN_BY_ONE_FRAME if not few and is_one_frame(seam) else LoopKind.NOT_A_LOOP
 
 
-def is_one_frame(seam: Seam) -> bool:
-    """Return whether a loop gap is about the next frame's motion."""
-    return seam.gap <= MAX_MISSING_FRAMES * seam.frame and seam.going_on <= seam.frame
-
-
-def open_joints(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> tuple[JointGap, ...]:
-    """Return the joints with a gap above rounding, the largest first."""
-    gaps = joint_gaps(skin, clip, start, end, root)
-    return tuple(each for each in gaps if each.gap > NOISE_PER_SIZE * skin.size)
-
-
-def are_few(joints: Sequence[JointGap], moving: set[int]) -> bool:
-    """Return whether fewer joints are open than close while they move."""
-    return len(joints) < len(moving - {each.node for each in joints})
-
-
 def _steps(skin: SkinMotion, clip: Clip, start: float, end: float, step: float, root: int) -> Steps:
     count = max(round(min((end - start) / step, MAX_COUNT)), 2)
     chosen = np.linspace(0, count - 1, min(count, MAX_STEPS))
@@ -179,22 +165,6 @@ def _some(numbers: Floats) -> Floats:
     """At most MAX_STEPS of some values, evenly chosen."""
     count = min(len(numbers), MAX_STEPS)
     return np.asarray(numbers[np.linspace(0, len(numbers) - 1, count).round().astype(int)])
-
-
-def loop_frame_rate(clip: Clip) -> float:
-    """Return the frame rate of an analysis: of regular keys their own, else DEFAULT_FPS.
-
-    A few keys of other tracks between the frames, as of a visibility track, don't change the rate.
-    """
-    times = clip.key_times
-    longest = max((axis.times for axis in clip.time_axes), key=len, default=times)
-    found = frame_rate.estimate_frame_rate(longest if len(longest) > MIN_REGULAR_FRACTION * len(times) else times)
-    return found.fps if found is not None and found.regular > MIN_REGULAR_FRACTION else DEFAULT_FPS
-
-
-def frame_duration(fps: float, start: float, end: float) -> float:
-    """Return the duration of a frame in s, at most half of a time range; 0 of an empty one."""
-    return min(1 / fps, (end - start) / 2) if end > start else 0.0
 
 
 def _travel(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from anim.measure.loops.skin_motion import SkinMotion, longest_each, morphed_ver
 from anim.sampling.batch import ConcatenatedTracks
 
 
-@dataclass(frozen=True, slots=True)
-class Seam:
+class Seam(NamedTuple):
     """Maximum over all vertices of the difference between end and start.
 
     gap: m. speed: m/s, the change of velocity without STEP tracks, and the joint at it (fastest, "" without a change).

@@ -54,7 +54,7 @@ def reduce_weights(
     if np.ptp(keys, axis=0).max(initial=0.0) == 0:
         keys, times = keys[:1], times[:1]
     keys, storage, stored = _encode_weights(keys, reach, QUANTIZATION_BUDGET_FRACTION * bound, packing)
-    storage = replace(storage, element="SCALAR")  # of pointers too, where the path does not imply it
+    storage = storage._replace(element="SCALAR")  # of pointers too, where the path does not imply it
     new = replace(track.with_keys(times, keys, interpolation=Interpolation.LINEAR), storage=storage)
     return new, stored, _displacement(sample(new, grid) - values, reach)
 

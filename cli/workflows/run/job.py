@@ -6,7 +6,7 @@ import os
 import shlex
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -135,7 +135,7 @@ def write_output(job: Job, product: Bytes) -> int:
     except OSError as error:
         raise not_written(str(path.parent), error) from None
     folder = (job.folder / job.input).parent
-    source = replace(open_bytes(product, job.output), folder=folder)
+    source = open_bytes(product, job.output)._replace(folder=folder)
     try:
         size = write_file(source.document, str(path), source, unchanged=product)
     except AnimError as error:
@@ -152,7 +152,7 @@ def stamp_companions(job: Job, product: Bytes, read: Iterable[str | Path]) -> di
 
     product: GLB of the last step, whose images come from the input's folder. read: files that the steps read.
     """
-    images = list(external_files(replace(open_bytes(product, job.output), folder=(job.folder / job.input).parent)))
+    images = list(external_files(open_bytes(product, job.output)._replace(folder=(job.folder / job.input).parent)))
     written = external_files(open_file(str(job.folder / job.output))) if images or is_text(job.output) else ()
     stamps = stamp_files(job.folder, [*read, *images, *written])
     return {path: stamp for path, stamp in stamps.items() if path not in map(os.path.normpath, (job.input, job.output))}

@@ -248,7 +248,7 @@ def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike 
     skin = SkinMotion(_chain(targets))
     whole = LoopRange(drifting, drifting.start, drifting.end)
     (alone,) = measure_seams(skin, [whole])
-    both = measure_seams(skin, [whole, replace(whole, frame=1 / FPS)])
+    both = measure_seams(skin, [whole, whole._replace(frame=1 / FPS)])
     assert both[0] == pytest.approx(alone)
     assert (alone.gap, alone.speed, alone.fastest) == pytest.approx((both[1].gap, both[1].speed, both[1].fastest))
     assert (alone.frame, alone.going_on) == (0.0, alone.gap)
