@@ -17,7 +17,7 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Skeleton
 from anim.optimization.search.candidates import Candidate, Candidates
-from anim.optimization.search.playback import level_world_matrices
+from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.search.source_motion import PROBE_FRAMES, SourceMotion
 from anim.optimization.search.time_axes import SharedAxis
 
@@ -34,7 +34,7 @@ class _Level:
 
 
 class ParentCompensation:
-    """Computes keys level by level, from the roots down."""
+    """Computes keys level by level, from the roots down to the last rotation tracks."""
 
     def __init__(self, skeleton: Skeleton, source: SourceMotion, candidates: Candidates) -> None:
         self._source = source
@@ -43,7 +43,11 @@ class ParentCompensation:
         for i, each in enumerate(source.moving):
             if each.path == "rotation":
                 tracks[each.node] = i
-        self._levels = [_Level(level, skeleton.parents[level], tracks[level]) for level in source.levels]
+        needed = np.zeros(len(skeleton), np.bool_)
+        for nodes in required_levels(skeleton, np.flatnonzero(tracks >= 0)):
+            needed[nodes] = True
+        chosen = [nodes[needed[nodes]] for nodes in source.levels]
+        self._levels = [_Level(nodes, skeleton.parents[nodes], tracks[nodes]) for nodes in chosen if len(nodes)]
         self._true = np.empty_like(source.local[1])
         for level, above in self._descending(self._true):
             self._true[level.nodes] = quaternion.multiply(above, quaternion.normalize(source.local[1][level.nodes]))
@@ -75,9 +79,11 @@ class ParentCompensation:
 
     def _descending(self, world: Floats) -> Iterator[tuple[_Level, Floats]]:
         """Every level with the world rotations (n, W, 4) of its nodes' parents, which callers fill in before."""
-        yield self._levels[0], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(self._levels[0].nodes), *world.shape[1:]))
-        for level in self._levels[1:]:
-            yield level, world[level.parents]
+        for depth, level in enumerate(self._levels):
+            if depth:
+                yield level, world[level.parents]
+            else:
+                yield level, np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(level.nodes), *world.shape[1:]))
 
     def _targets(self, nodes: Ints, above: Floats) -> Floats:
         """Local rotations (W, n, 4) that restore the source's world orientation under parents (n, W, 4)."""

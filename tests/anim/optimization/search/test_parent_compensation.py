@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Bools, Floats
+from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Scene
 from anim.optimization.options import Packing
@@ -97,3 +98,23 @@ def test_only_rotations_have_leeway() -> None:
     sway = track("translation", TIMES, np.ones((25, 3)) * TIMES[:, None], node=0)
     source = truth_of(ARM, clip(sway, *BENDS.tracks), TIP)
     assert budget_gain(ARM.skeleton, source, TIP)[0] == 1
+
+
+def test_nodes_below_the_last_rotation_track_take_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long chain whose second node turns: world rotations of two nodes are needed."""
+    chain = Scene(skeleton(range(-1, 99), translation=np.tile([0.01, 0, 0], (100, 1))), ())
+    tip = PointMatrix(np.array([99]), np.array([[0]]), np.array([[[0.1, 0, 0, 1]]]))
+    source = truth_of(chain, clip(track("rotation", TIMES, turning(0.6, (0, 1, 0)), node=1)), tip)
+    sizes: list[int] = []
+
+    def called(a: Floats, b: Floats) -> Floats:
+        sizes.append(len(b))
+        return multiply(a, b)
+
+    multiply = quaternion.multiply
+    monkeypatch.setattr(quaternion, "multiply", called)
+    compensation = ParentCompensation(chain.skeleton, source, Candidates(source, Packing.CORE))
+    assert sizes == [1, 1]
+    found = dict(compensation.follow([SharedAxis(EVERY_KEY, (0,))], [1e-3], source.local[1].copy()))
+    assert list(found) == [0]
+    assert len(sizes) <= 6
