@@ -97,7 +97,8 @@ def report_error(error: AnimError) -> int:
         vars(error).pop("__notes__", None)  # the help, which is written separately
         _print_trace()
     where = f"{cut_middle(error.where)}: " if error.where else ""
-    _print_error(where + cut_middle(error.problem), error.help)
+    # Reports of several files print errors on their own, without the options of a command; this one all commands have
+    _print_error(where + cut_middle(error.problem), error.help.replace("`memory_limit`", "--memory-limit"))
     return code
 
 

@@ -20,6 +20,7 @@ from anim import units
 from anim.errors import AnimError, RangeError, not_written
 
 OUTPUTS = ("output", "files")  # parameters whose value, or last value, is OUT
+STDOUT_PATHS = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")  # opened again, a file would begin anew
 DEPFILE = "gltf_anim.depfile"  # key of the context
 MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
 METAVARS = {str: "TEXT", int: "N", float: "N"}
@@ -64,6 +65,9 @@ class Command(Parsing, TyperCommand):
 
         from anim.memory import memory_limit
 
+        for name in OUTPUTS:
+            if ctx.params.get(name) in STDOUT_PATHS:
+                ctx.params[name] = "-"
         try:
             # Results that are not finite are errors where they are written.
             with np.errstate(all="ignore"), memory_limit(ctx.meta.get(MEMORY_LIMIT)):

@@ -13,7 +13,7 @@ import pytest
 
 from fixtures.broken.pieces import buffered, text
 from tests.cli.conftest import Call
-from tests.cli.running import built, refusal
+from tests.cli.running import built, refusal, shell
 from tests.fixtures.reading import split
 from tests.fuzz.simulation_seeds import pack
 
@@ -168,3 +168,26 @@ def test_what_curves_say_is_cut_in_messages(change: dict[str, Any], call: Call, 
     run = call("from-euler", tmp_path / "in.json", tmp_path / "out.glb")
     refusal(run, 3)
     assert max(map(len, run.err.splitlines())) < 800
+
+
+def test_a_buffer_of_another_file_is_not_overwritten(call: Call, tmp_path: Path) -> None:
+    """b.bin belongs to a.gltf; a new b.gltf takes a buffer of another name."""
+    document, blob = split(built("arm"))
+    (tmp_path / "b.bin").write_bytes(blob)
+    document["buffers"] = [{"byteLength": len(blob), "uri": "b.bin"}]
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    (tmp_path / "in.glb").write_bytes(built("biped"))
+    before = call("convert", tmp_path / "a.gltf", "-").product()
+    call("convert", tmp_path / "in.glb", tmp_path / "b.gltf").product()
+    assert call("convert", tmp_path / "a.gltf", "-").product() == before
+    assert (tmp_path / "b.bin").read_bytes() == blob
+    assert call("inspect", tmp_path / "b.gltf").code == 0
+
+
+@pytest.mark.parametrize("way", ["> out", ">> out", "| cat > out"])
+def test_stdout_by_its_path_takes_what_stdout_takes(way: str, tmp_path: Path) -> None:
+    """What is there before stays; a file is no pipe, and is not replaced."""
+    (tmp_path / "in.glb").write_bytes(built("arm"))
+    shell(f"(echo hi; gltf-anim convert in.glb /dev/stdout -q) {way}", tmp_path).product()
+    shell("gltf-anim convert in.glb - -q > plain", tmp_path).product()
+    assert (tmp_path / "out").read_bytes() == b"hi\n" + (tmp_path / "plain").read_bytes()

@@ -18,7 +18,7 @@ import pytest
 from anim import memory
 from anim.errors import UnsupportedError
 from anim.gltf.meshopt import codec
-from fixtures.broken.pieces import data_uri, text
+from fixtures.broken.pieces import buffered, data_uri, text
 from tests.cli.conftest import Call
 from tests.cli.running import ENVIRONMENT, ROOT, built, help_line, refusal
 
@@ -76,6 +76,64 @@ def compressed_views(count: int) -> bytes:
             "meshes": [{"primitives": [{"attributes": {"POSITION": i}} for i in range(count)]}],
         }
     )
+
+
+def of_animation(count: int, keys: int, *, shared: bool) -> bytes:
+    """Translations of `count` nodes, each by an accessor of its own: of one view, or without data."""
+    arrays = buffered(("SCALAR", 5126, np.arange(keys) / 30), ("VEC3", 5126, np.zeros((keys, 3))))
+    output = arrays["accessors"][1] if shared else {"componentType": 5126, "count": keys, "type": "VEC3"}
+    samplers = [{"input": 0, "output": 2 + i} for i in range(count)]
+    channels = [{"sampler": i, "target": {"node": i, "path": "translation"}} for i in range(count)]
+    return text(
+        {
+            "scenes": [{"nodes": list(range(count))}],
+            "nodes": [{}] * count,
+            **arrays,
+            "accessors": [*arrays["accessors"], *[output] * count],
+            "animations": [{"samplers": samplers, "channels": channels}],
+        }
+    )
+
+
+def of_joints(count: int) -> bytes:
+    """A skin of two nodes over and over."""
+    weights = ("VEC4", 5126, np.tile([1, 0, 0, 0], (3, 1)))
+    arrays = buffered(("VEC3", 5126, np.eye(3)), ("VEC4", 5123, np.zeros((3, 4))), weights, ("SCALAR", 5126, [0, 1]))
+    attributes = {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}
+    animation = {"samplers": [{"input": 3, "output": 0}], "channels": []}
+    return text(
+        {
+            "scenes": [{"nodes": [0, 2]}],
+            "nodes": [{"children": [1]}, {}, {"mesh": 0, "skin": 0}],
+            "skins": [{"joints": [0, 1] * (count // 2)}],
+            **arrays,
+            "meshes": [{"primitives": [{"attributes": attributes}]}],
+            "animations": [animation],
+        }
+    )
+
+
+@pytest.mark.parametrize("line", ["resample IN out.glb --fps 5", "optimize IN out.glb", "inspect IN", "check IN"])
+@pytest.mark.parametrize(("count", "keys", "shared"), [(200, 500_000, False), (2000, 50_000, True)])
+def test_outputs_of_an_animation_count_in_all(
+    count: int, keys: int, shared: bool, line: str, call: Call, tmp_path: Path
+) -> None:
+    path = tmp_path / "in.gltf"
+    path.write_bytes(of_animation(count, keys, shared=shared))
+    names = {"IN": path, "out.glb": tmp_path / "out.glb"}
+    run = call(*(names.get(word, word) for word in line.split()))
+    said, advice = run.err.splitlines()[-2:]  # after what is readable, of inspect and check
+    assert (run.code, advice) == (4, "help: raise --memory-limit, or split the file")
+    assert "would take" in said
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("line", [["bake", "out.npz", "--fps", "4"], ["render", "out.png"]], ids=lambda line: line[0])
+def test_joints_of_a_skin_count(line: list[str], call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.gltf"
+    path.write_bytes(of_joints(300_000))
+    command, out, *options = line
+    assert "would take" in refusal(call(command, path, tmp_path / out, *options), 4)
 
 
 @pytest.mark.parametrize("data", [targets(300, 2_000_000), compressed_views(300)], ids=["targets", "meshopt"])
