@@ -148,10 +148,15 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
     if not parts:
         return PointMatrix(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
     nodes = np.flatnonzero(np.bincount(np.concatenate([nodes.reshape(-1) for nodes, _ in parts])))
-    width = max(nodes.shape[1] for nodes, _ in parts)
-    joints = [np.pad(np.searchsorted(nodes, own), ((0, 0), (0, width - own.shape[1]))) for own, _ in parts]
-    factors = [np.pad(each, ((0, 0), (0, width - each.shape[1]), (0, 0))) for _, each in parts]
-    return PointMatrix(nodes, np.concatenate(joints), np.concatenate(factors))
+    count, width = sum(len(own) for own, _ in parts), max(own.shape[1] for own, _ in parts)
+    joints: Ints = np.full((count, width), nodes[0] if len(nodes) else 0, np.int64)
+    factors = np.zeros((count, width, 4))
+    at = 0
+    for own, each in parts:  # of files with many meshes: few calls for each
+        some = slice(at, at + len(own)), slice(own.shape[1])
+        joints[some], factors[some] = own, each
+        at += len(own)
+    return PointMatrix(nodes, np.searchsorted(nodes, joints), factors)
 
 
 def extreme_vertices(surface: Surface) -> set[int]:

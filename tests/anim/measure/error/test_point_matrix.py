@@ -7,9 +7,9 @@ import pytest
 
 from anim.arrays import Floats
 from anim.measure.error import point_matrix as points_
-from anim.measure.error.point_matrix import CARRIED, PointMatrix, sample_points, stack_points
+from anim.measure.error.point_matrix import CARRIED, PointMatrix, all_points, sample_points, stack_points
 from anim.measure.error.surface import surfaces
-from anim.model import Scene
+from anim.model import MeshInstance, Scene
 from anim.sampling import rest_pose, world_matrices
 from tests.anim.optimization.making import JOINTS, every_point, scene
 from tests.anim.skinning.scenes import looped, mesh
@@ -114,6 +114,21 @@ def test_extra_vertices_are_measured_too() -> None:
     missing = min(set(range(60)) - points_.extreme_vertices(surface))
     assert len(sample_points(of, frozenset(), 0.0, {(0, missing)})) == len(usual) + 1
     assert len(sample_points(of, frozenset(), 0.0, {(1, missing)})) == len(usual)
+
+
+def test_meshes_of_different_numbers_of_influences() -> None:
+    """A skinned mesh and two on their nodes: their points follow one another."""
+    skinned = made(mesh([[1.0, 0, 0], [0, 2, 0]], [[0, 1], [1, 0]], [[0.5, 0.5], [0.75, 0.25]]), [-1, 0, 1])
+    corners = np.array([[0.0, 0, 1], [0, 1, 1]])
+    rigid = mesh(corners, [[0], [0]], [[1.0], [1.0]])
+    instances = [*skinned.instances, *(MeshInstance(node, rigid, None, np.zeros(0)) for node in (2, 0))]
+    of = Scene(skinned.skeleton, tuple(instances))
+    world = _world(of)
+    found = all_points(of, 0.0).places(world)
+    assert found[:2] == pytest.approx(all_points(skinned, 0.0).places(world))
+    for at, node in ((2, 2), (4, 0)):
+        expected = np.einsum("fab,vb->vfa", world[node][..., :3], corners) + world[node][..., 3]
+        assert found[at : at + 2] == pytest.approx(expected)
 
 
 def test_morphed_as_at_rest() -> None:
