@@ -95,7 +95,17 @@ class CheckedFile:
 
     def tracks(self, path: str, wanted: Callable[[Track], bool] = lambda track: True) -> TrackTable:
         """Return the keys of tracks of a path in the chosen clips."""
-        return track_table(((report.index, clip) for report, clip in self.clips()), path, wanted)
+        return track_table([each for each in self._tracks_by_path.get(path, ()) if wanted(each[1])], path)
+
+    @cached_property
+    def _tracks_by_path(self) -> dict[str, list[tuple[int, Track]]]:
+        """Tracks with a node of the chosen clips, with the indices of their clips."""
+        found: dict[str, list[tuple[int, Track]]] = {}
+        for report, clip in self.clips():
+            for track in clip.tracks:
+                if track.node is not None:
+                    found.setdefault(track.path, []).append((report.index, track))
+        return found
 
     def per_clip(self, table: TrackTable, counts: Ints) -> Iterator[Occurrence]:
         """Yield an occurrence for each clip with counts of its tracks (T,) above 0."""
@@ -104,8 +114,9 @@ class CheckedFile:
 
     def at_keys(self, table: TrackTable, marked: Bools) -> Iterator[Occurrence]:
         """Yield an occurrence for each clip with marked keys (S,), at the first of them."""
+        first = table.first_keys(marked)
         for clip, count in table.per_clip(table.count_marked(marked)):
-            node, time_s = table.first_key(clip, marked)
+            node, time_s = first[clip]
             yield self.in_clip(clip, count, time_s=time_s, node=node)
 
     def at_rotation_steps(
@@ -115,11 +126,15 @@ class CheckedFile:
 
         counts: by index of the clip. is_fault: a mask (S,) from the dot products (S,) of keys with those before them.
         """
-        clips = {number: self.contents.clips[number] for number, count in counts.items() if count}
-        table = track_table(clips.items(), "rotation", lambda track: track.interpolation is interpolation)
+        clips = [number for number, count in counts.items() if count]
+        if not clips:
+            return
+        rotations = self._tracks_by_path.get("rotation", ())
+        chosen = [each for each in rotations if counts.get(each[0]) and each[1].interpolation is interpolation]
+        table = track_table(chosen, "rotation")
         marked = table.inner_steps()
         marked[1:] &= is_fault(quaternion.dot(table.values[1:], table.values[:-1]))
-        at = {number: table.first_key(number, marked) for number, _ in table.per_clip(table.count_marked(marked))}
+        at = table.first_keys(marked)
         for number in clips:
             node, time_s = at.get(number, (None, None))  # without one: tracks of pointers
             yield self.in_clip(number, counts[number], time_s=time_s, node=node)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.model import Clip, Track
+from anim.model import Track
 
 
 class TrackTable(NamedTuple):
@@ -39,31 +39,30 @@ class TrackTable(NamedTuple):
 
     def per_clip(self, counts: Ints) -> Iterator[tuple[int, int]]:
         """Yield the index of each clip with counts (T,) of its tracks above 0, and their sum."""
+        sums = np.bincount(self.clips, counts)
         for clip in dict.fromkeys(self.clips[counts > 0].tolist()):
-            yield clip, int(counts[self.clips == clip].sum())
+            yield clip, int(sums[clip])
 
-    def first_key(self, clip: int, marked: Bools) -> tuple[int, float]:
-        """Return node and time, s, of the earliest of the marked keys (S,) of a clip."""
-        keys = np.flatnonzero(marked & np.repeat(self.clips == clip, self.counts))
-        first = int(keys[self.times[keys].argmin()])
-        track = int(np.searchsorted(self.starts, first, side="right")) - 1
-        return int(self.nodes[track]), float(self.times[first])
+    def first_keys(self, marked: Bools) -> dict[int, tuple[int, float]]:
+        """Return node and time, s, of the earliest of the marked keys (S,) of each clip that has one, by its index."""
+        keys = np.flatnonzero(marked)
+        tracks = np.searchsorted(self.starts, keys, side="right") - 1
+        order = np.lexsort((self.times[keys], self.clips[tracks]))
+        clips = self.clips[tracks[order]]
+        first = order[np.flatnonzero(np.diff(clips, prepend=-1))]
+        found = zip(self.nodes[tracks[first]].tolist(), self.times[keys[first]].tolist(), strict=True)
+        return dict(zip(self.clips[tracks[first]].tolist(), found, strict=True))
 
     def targets(self, marked: Bools) -> set[tuple[int, int]]:
         """Return clip and node of each marked track (T,)."""
         return {(int(self.clips[i]), int(self.nodes[i])) for i in np.flatnonzero(marked)}
 
 
-def track_table(
-    clips: Iterable[tuple[int, Clip]], path: str, wanted: Callable[[Track], bool] = lambda track: True
-) -> TrackTable:
-    """Return the wanted tracks of a path in clips with their indices. path: not "weights", whose width differs."""
-    found = [
-        (index, track)
-        for index, clip in clips
-        for track in clip.tracks
-        if track.path == path and track.node is not None and wanted(track)
-    ]
+def track_table(found: Sequence[tuple[int, Track]], path: str) -> TrackTable:
+    """Return the table of tracks of a path, given with the indices of their clips.
+
+    path: not "weights", whose width differs.
+    """
     counts = np.array([len(track.values) for _, track in found], np.int64)
     values = [track.values for _, track in found]
     return TrackTable(

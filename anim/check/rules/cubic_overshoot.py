@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -20,9 +21,11 @@ SAMPLES = np.linspace(0, 1, 17)[1:-1, None, None]  # of a segment: a cubic's ext
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks."""
     for report, clip in file.clips():
-        tracks = [track for track in clip.tracks if overshoot(track) > parameters["excess"]]
-        if tracks:
-            yield file.in_clip(report.index, len(tracks), node=max(tracks, key=overshoot).node)
+        splines = [track for track in clip.tracks if track.interpolation is Interpolation.CUBICSPLINE]
+        excesses = [(excess, track) for track in splines if (excess := overshoot(track)) > parameters["excess"]]
+        if excesses:
+            _, worst = max(excesses, key=operator.itemgetter(0))
+            yield file.in_clip(report.index, len(excesses), node=worst.node)
 
 
 def overshoot(track: Track) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule, counted
-from anim.model import parse_weight_pointer
+from anim.model import Track, parse_weight_pointer
 
 TOLERANCE = 1e-6
 
@@ -15,11 +15,14 @@ TOLERANCE = 1e-6
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such keys."""
     for report, clip in file.clips():
-        tracks = (track for track in clip.tracks if track.path == "weights" or parse_weight_pointer(track.pointer))
-        weights = [track.values for track in tracks]
+        weights = [track.values for track in clip.tracks if _moves_weights(track)]
         keys = sum(int(((values < -TOLERANCE) | (values > 1 + TOLERANCE)).any(axis=1).sum()) for values in weights)
         if keys:
             yield file.in_clip(report.index, keys)
+
+
+def _moves_weights(track: Track) -> bool:
+    return track.path == "weights" or (track.pointer is not None and parse_weight_pointer(track.pointer) is not None)
 
 
 RULE = Rule(
