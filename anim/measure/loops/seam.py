@@ -53,21 +53,23 @@ def _seams(skin: SkinMotion, seen: Sequence[EndPoses], parts: Sequence[LoopRange
     worlds = np.stack([each.world for each in seen], axis=1)  # (N, parts, T, 3, 4)
     differences = clip_ends.differences(worlds, 2, wanted)
     squares = skin.squares(differences.reshape(len(skin.skeleton), -1, 3, 4)).reshape(len(skin.vertices), len(seen), -1)
-    return [
-        _seam(skin, squares[:, i], each, part, wanted) for i, (each, part) in enumerate(zip(seen, parts, strict=True))
-    ]
+    morphing = [skin.exclude_morphing(squares[:, i], each.weights) for i, each in enumerate(seen)]
+    most = np.sqrt(squares.max(axis=0)).astype(np.float64)  # (parts, D): of all ranges at once
+    points = squares[..., clip_ends.VELOCITY].argmax(axis=0)
+    found = []
+    for i, (each, part) in enumerate(zip(seen, parts, strict=True)):
+        fastest, lengths = _carrier(skin, int(points[i])), most[i]
+        for mesh in morphing[i]:
+            moved = longest_each(clip_ends.differences(morphed_vertices(mesh, each), 0, wanted))
+            if moved[clip_ends.VELOCITY] > lengths[clip_ends.VELOCITY]:
+                fastest = skin.skeleton.display_name(mesh.owner)
+            lengths = np.maximum(lengths, moved)
+        found.append(_seam(lengths, fastest, part))
+    return found
 
 
-def _seam(skin: SkinMotion, squares: Floats, seen: EndPoses, part: LoopRange, wanted: Floats) -> Seam:
-    """squares: (P, D), the squared lengths of all differences, with morphing meshes at rest."""
-    morphing = skin.exclude_morphing(squares, seen.weights)
-    most = np.sqrt(squares.max(axis=0)).astype(np.float64)
-    fastest = _carrier(skin, int(squares[:, clip_ends.VELOCITY].argmax()))
-    for mesh in morphing:
-        moved = longest_each(clip_ends.differences(morphed_vertices(mesh, seen), 0, wanted))
-        if moved[clip_ends.VELOCITY] > most[clip_ends.VELOCITY]:
-            fastest = skin.skeleton.display_name(mesh.owner)
-        most = np.maximum(most, moved)
+def _seam(most: Floats, fastest: str, part: LoopRange) -> Seam:
+    """most: (D,), the largest length of each difference. fastest: the node with the largest change of velocity."""
     gap, speed, *of_frames = most.tolist()
     second, last, going_on = of_frames or (0.0, 0.0, gap)
     speed = speed / (part.probe - part.shortest) if part.end > part.start else 0.0
