@@ -1,4 +1,4 @@
-"""`python -m anim`: the command `gltf-anim`, without modules of the current folder."""
+"""Entry point of the installed command, and of `python -m anim`."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ import sys
 
 
 def main() -> None:
-    """Run the command line of this process and exit with its exit code."""
-    if sys.path[0] in ("", os.getcwd()) and not os.path.samefile(os.curdir, _root()):
-        del sys.path[0]  # where Python puts the current folder, whatever it holds
-    from gltf_anim import main as run
+    """Run the command line of this process and exit with its exit code.
 
+    Folders of $PYTHONPATH come before installed packages, and one that is there for another project often has a
+    `cli.py`: `cli` is imported from beside this package.
+    """
+    beside = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    sys.path.insert(0, beside)
+    try:
+        from cli.entry_point import main as run
+    finally:
+        sys.path.remove(beside)
     run()
-
-
-def _root() -> str:
-    return os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 if __name__ == "__main__":
