@@ -27,6 +27,7 @@ MIN_CUBIC_SEGMENT_S = 1e-5  # float32 times below a minute have a finer resoluti
 MAX_SUBDIVISIONS = 64  # segments that one segment is split into at a time
 MAX_KEYS = 500_000
 MAX_ROUNDS = 40
+BLOCK = 20_000  # segments that are counted at a time, with up to 16 samples each: 30 MB
 
 SegmentCount: TypeAlias = Callable[[Floats, Floats], Ints]  # starts, ends (B,) → (B,); 1 where no split is needed
 
@@ -56,7 +57,7 @@ def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tu
     another key at the previous float32 time. No segment rotates by more than 120°; signs are continuous.
     tolerance: radians for rotations, the value's own unit otherwise; > 0.
     XYZ (0, 0, 0) → (90°, 90°, 0) at 0.1° → 15 keys
-    Raises RangeError for over two million keys.
+    Raises DataRangeError for over MAX_KEYS keys.
     """
 
     def count(a: Floats, b: Floats) -> Ints:
@@ -119,7 +120,7 @@ def refine(times: Floats, count: SegmentCount) -> Floats:
 
     count: takes segments from a to b (B,), returns for each the number of segments (B,), up to MAX_SUBDIVISIONS, to
     split it into; 1 for none.
-    Raises RangeError for over two million keys.
+    Raises DataRangeError for over MAX_KEYS keys.
     """
     found, a, b = [times], times[:-1], times[1:]
     for _ in range(MAX_ROUNDS):
@@ -128,13 +129,18 @@ def refine(times: Floats, count: SegmentCount) -> Floats:
         a, b = a[splittable], b[splittable]
         if not len(a):
             break
-        counts = count(a, b)
+        counts = _count_in_blocks(count, a, b)
         again = counts > 1
         if counts[again].sum() + sum(map(len, found)) > MAX_KEYS:
             raise DataRangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
         a, b = split_segments(a[again], b[again], counts[again])
         found.append(a)
     return unique_sorted(np.concatenate(found))
+
+
+def _count_in_blocks(count: SegmentCount, a: Floats, b: Floats) -> Ints:
+    counts = [count(a[i : i + BLOCK], b[i : i + BLOCK]) for i in range(0, len(a), BLOCK)]
+    return np.concatenate(counts)
 
 
 def split_segments(a: Floats, b: Floats, counts: Ints) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.curves.fitting import adaptive_keys
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, linear_keys, refine, segment_count
 from anim.errors import RangeError
@@ -70,3 +70,15 @@ def test_too_many_keys_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(adaptive_keys, "MAX_KEYS", 100)
     with pytest.raises(RangeError, match="over 100 keys"):
         refine(ENDS, lambda a, b: np.full(len(a), 8))
+
+
+def test_memory_is_that_of_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adaptive_keys, "BLOCK", 10)
+    sizes = []
+
+    def count(a: Floats, b: Floats) -> Ints:
+        sizes.append(len(a))
+        return np.where(b - a > 1 / 64, 2, 1)
+
+    assert refine(ENDS, count).tolist() == np.linspace(0, 2, 129).tolist()
+    assert max(sizes) == 10
