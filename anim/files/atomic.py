@@ -105,7 +105,7 @@ class AtomicOutputs:
                     with temporary.open("rb") as source, path.open("wb") as target:
                         shutil.copyfileobj(source, target, BLOCK_BYTES)
                 elif not path.exists() or not filecmp.cmp(temporary, path, shallow=False):
-                    os.chmod(temporary, mode_of(path))
+                    copy_permissions(path, temporary)
                     new[path] = temporary
             _replace_set(new, self.folder / main)
 
@@ -175,7 +175,7 @@ def write_temporary(path: Path, pieces: Iterable[Bytes], made: list[Path]) -> Pa
     made.append(temporary)
     with os.fdopen(handle, "wb") as file:
         file.writelines(piece.data for piece in pieces)
-    os.chmod(temporary, mode_of(path))
+    copy_permissions(path, temporary)
     return temporary
 
 
@@ -198,6 +198,19 @@ def move_to_free(temporary: Path, path: Path) -> None:
         except BaseException:
             os.unlink(path)
             raise
+
+
+def copy_permissions(path: Path, temporary: Path) -> None:
+    """Give a temporary file the permissions of the file that it will replace, or of a new one.
+
+    Also owner and group, as far as the system allows: root that writes over a file of others leaves it theirs.
+    """
+    if path.exists() and hasattr(os, "chown"):
+        old, new = path.stat(), temporary.stat()
+        if (old.st_uid, old.st_gid) != (new.st_uid, new.st_gid):
+            with suppress(OSError):
+                os.chown(temporary, old.st_uid, old.st_gid)
+    os.chmod(temporary, mode_of(path))
 
 
 def mode_of(path: Path) -> int:

@@ -168,6 +168,17 @@ def test_mode_bits_are_kept(mode: int, call: Call, walk: Path, tmp_path: Path) -
     assert stat.S_IMODE(out.stat().st_mode) == mode
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files to others")
+@pytest.mark.parametrize("out", ["out.glb", "out.gltf"])
+def test_files_of_others_stay_theirs(out: str, call: Call, walk: Path, tmp_path: Path) -> None:
+    path = tmp_path / out
+    path.touch()
+    os.chown(path, 1234, 5678)
+    call("convert", walk, path).product()
+    assert path.stat().st_size > 0
+    assert (path.stat().st_uid, path.stat().st_gid) == (1234, 5678)
+
+
 @pytest.mark.parametrize(("mask", "mode"), [("022", 0o644), ("077", 0o600), ("002", 0o664)])
 def test_new_files_have_the_mode_that_any_program_gives(mask: str, mode: int, walk: Path, tmp_path: Path) -> None:
     shell(f"umask {mask} && gltf-anim convert walk.glb out.glb", tmp_path).product()
