@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +11,11 @@ from anim.arrays import Floats
 from anim.exchange.euler.curve import Curve, evaluate
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.maths import euler, quaternion
+from anim.maths.euler import AxesConvention
 from anim.model import Skeleton
 from anim.sampling import rest_world
+
+START = np.zeros(1)  # s
 
 
 def evaluate_rotation(node: EulerNode, at: Floats, before: bool = False) -> Floats:
@@ -54,15 +57,38 @@ def evaluate_translation(node: EulerNode, at: Floats, before: bool = False) -> F
 
 def skeleton(motion: EulerMotion) -> Skeleton:
     """Return all nodes in the rest pose: axes at their rest angles, without curves."""
-    start = np.zeros(1)
-    still = [replace(node, rotation=(None,) * len(node.order), moves={}, scales={}) for node in motion.nodes]
+    nodes = motion.nodes
     return Skeleton(
-        tuple(node.name for node in still),
-        np.array([node.parent for node in still], np.int64),
-        np.array([evaluate_translation(node, start)[0] for node in still]).reshape(-1, 3),
-        np.array([evaluate_rotation(node, start)[0] for node in still]).reshape(-1, 4),
-        np.array([node.scale for node in still]).reshape(-1, 3),
+        tuple(node.name for node in nodes),
+        np.array([node.parent for node in nodes], np.int64),
+        np.array([_rest_translation(node) for node in nodes]).reshape(-1, 3),
+        _rest_rotations(nodes),
+        np.array([node.scale for node in nodes]).reshape(-1, 3),
     )
+
+
+def _rest_rotations(nodes: Sequence[EulerNode]) -> Floats:
+    """Rest rotations (N, 4); nodes of one convention at a time, since files have thousands."""
+    found = np.zeros((len(nodes), 4))
+    conventions: dict[tuple[str, AxesConvention], list[int]] = {}
+    for i, node in enumerate(nodes):
+        if node.pivots is NO_PIVOTS:
+            conventions.setdefault((node.order, node.frame), []).append(i)
+        else:
+            found[i] = evaluate_rotation(_at_rest(node), START)[0]
+    for (order, frame), some in conventions.items():
+        angles = np.array([nodes[i].angles for i in some]).reshape(len(some), len(order))
+        found[some] = euler.to_quaternion(angles, order=order, frame=frame)
+    return found
+
+
+def _rest_translation(node: EulerNode) -> Floats:
+    return node.translation if node.pivots is NO_PIVOTS else evaluate_translation(_at_rest(node), START)[0]
+
+
+def _at_rest(node: EulerNode) -> EulerNode:
+    """The node without curves."""
+    return replace(node, rotation=(None,) * len(node.order), moves={}, scales={})
 
 
 def rest_positions(skeleton: Skeleton) -> Floats:
