@@ -84,7 +84,8 @@ class OpenIntervals:
 
         Returns the largest bound of those that are closed, in m.
         """
-        intervals, firsts = np.unique(looked.interval, return_index=True)
+        firsts = np.flatnonzero(np.diff(looked.interval, prepend=-1))
+        intervals = looked.interval[firsts]
         if not len(intervals):
             self.is_open = np.zeros_like(self.is_open)
             return 0.0

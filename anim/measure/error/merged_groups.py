@@ -67,19 +67,40 @@ def merge_surfaces(
     The latter follow the world in both versions.
     """
     found: list[SkinnedGroups] = []
-    rigid: dict[int, list[RigidPoints]] = {}
-    static = 0
+    rigid: list[Surface] = []
     for each, binding in surfaces:
+        if binding is None and len(each.nodes) == 1 and not len(each.targets):
+            rigid.append(each)
+            continue
         surface, new = _reduce(each, binding, skeleton)
-        if new is not None or len(surface.nodes) > 1 or len(surface.targets):
-            found.append(SkinnedGroups(surface, new))
-        elif surface.nodes[0] == skeleton.origin:
-            static += len(surface.points)
+        if new is None and len(surface.nodes) == 1 and not len(surface.targets):
+            rigid.append(each)
         else:
-            points = RigidPoints(surface.name, matrix.apply(surface.bind[0], surface.points))
-            rigid.setdefault(int(surface.nodes[0]), []).append(points)
-    found += [MergedGroups(node, points, vertices=True) for node, points in rigid.items()]
-    return found, static
+            found.append(SkinnedGroups(surface, new))
+    merged, static = _merge_rigid(rigid, skeleton)
+    return [*found, *merged], static
+
+
+def _merge_rigid(surfaces: Sequence[Surface], skeleton: ReducedSkeleton) -> tuple[list[MergedGroups], int]:
+    """The groups of surfaces with one joint each, in order of their nodes, and the number of vertices without one.
+
+    Surfaces with equal numbers of points are moved at once, since scenes without meshes have one per node.
+    """
+    if not surfaces:
+        return [], 0
+    nodes = np.array([each.nodes[0] for each in surfaces])
+    anchors, sizes = skeleton.anchors[nodes], np.array([len(each.points) for each in surfaces])
+    bind = matrix.multiply(skeleton.offsets[nodes], np.concatenate([each.bind for each in surfaces]))
+    moving = anchors != skeleton.origin
+    points: dict[int, Floats] = {}
+    for size in sorted(set(sizes[moving].tolist())):
+        some = np.flatnonzero(moving & (sizes == size)).tolist()
+        points.update(zip(some, matrix.apply(bind[some], np.stack([surfaces[i].points for i in some])), strict=True))
+    rigid: dict[int, list[RigidPoints]] = {}
+    for i in np.flatnonzero(moving).tolist():
+        rigid.setdefault(int(anchors[i]), []).append(RigidPoints(surfaces[i].name, points[i]))
+    groups = [MergedGroups(node, parts, vertices=True) for node, parts in rigid.items()]
+    return groups, int(sizes[~moving].sum())
 
 
 def merge_shells(nodes: Ints, points: Floats, names: Sequence[str], skeleton: ReducedSkeleton) -> list[MergedGroups]:

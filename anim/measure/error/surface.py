@@ -102,10 +102,11 @@ def _of_instance(scene: Scene, instance: MeshInstance) -> Surface:
 def _of_nodes(scene: Scene) -> Iterator[Surface]:
     size = SHELL * diagonal(scene)
     cube = size * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    _, bind, joints, weights = _rigid(0, len(cube))
+    targets, no_weights = np.empty((0, 8, 3)), np.empty(0)
     for node in range(len(scene.skeleton)):
-        nodes, bind, joints, weights = _rigid(node, len(cube))
         name = scene.skeleton.display_name(node)
-        yield Surface(name, nodes, bind, cube, np.empty((0, 8, 3)), joints, weights, node, np.empty(0))
+        yield Surface(name, np.array([node]), bind, cube, targets, joints, weights, node, no_weights)
 
 
 def _rigid(node: int, vertices: int) -> tuple[Ints, Floats, Ints, Floats]:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anim.maths import quaternion
+from anim.arrays import Floats
+from anim.maths import matrix, quaternion
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error import reduced_skeleton
 from anim.measure.error.metric import ErrorMetric
@@ -128,3 +129,21 @@ def test_static_vertices_are_counted() -> None:
     groups = sum(len(group) for part in found.parts for group in part.groups)
     assert found.num_static_points > 0
     assert groups + found.num_static_points == scene.vertex_count
+
+
+@pytest.mark.parametrize("meshes", [True, False], ids=["meshes", "nodes"])
+def test_rigid_points_are_moved_at_once(meshes: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not node by node: scenes without meshes have points around thousands."""
+    random = np.random.default_rng(1)
+    scene = _scene(random, meshes=meshes)
+    calls = []
+    whole = matrix.apply
+
+    def counted(matrices: Floats, points: Floats) -> Floats:
+        calls.append(len(matrices))
+        return whole(matrices, points)
+
+    monkeypatch.setattr(matrix, "apply", counted)
+    ErrorMetric(scene, clips=_clips(random))
+    assert len(calls) <= 3
+    assert max(calls) > 5
