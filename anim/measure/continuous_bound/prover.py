@@ -44,7 +44,7 @@ class ProofTarget(NamedTuple):
     slack: float
 
     @property
-    def most(self) -> float:
+    def max_bound(self) -> float:
         """The largest bound in m that needs no refinement."""
         return self.found + self.slack
 
@@ -128,7 +128,7 @@ class Prover:
         for player, each in limits.items():
             ends = each[:, :-1], each[:, 1:] + risen.jump
             tops = np.maximum(*ends) + risen.rise
-            is_open = (tops > aim.most) & self.is_refined
+            is_open = (tops > aim.max_bound) & self.is_refined
             closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
             if is_open.any():
                 opened.append(OpenIntervals(player, ends, risen.rise, is_open))
@@ -149,12 +149,12 @@ class Prover:
             if not opened:
                 break
             finest = np.maximum.reduce([each.num_parts(aim.slack) for each in opened])
-            margins = [aim.slack if is_last else each.margin(aim.most, aim.slack) for each in opened]
+            margins = [aim.slack if is_last else each.margin(aim.max_bound, aim.slack) for each in opened]
             parts = np.maximum.reduce([each.num_parts(margin) for each, margin in zip(opened, margins, strict=True)])
-            asked, edges = zip(*(each.subdivide(times, parts, aim.most) for each in opened), strict=True)
-            found = refine(self.ruler, clips, asked, self._parts, target=aim.most)
+            asked, edges = zip(*(each.subdivide(times, parts, aim.max_bound) for each in opened), strict=True)
+            found = refine(self.ruler, clips, asked, self._parts, target=aim.max_bound)
             seen = max(seen, found, key=lambda each: each.largest)
-            inner = [each.close(some, aim.most, parts < finest) for each, some in zip(opened, asked, strict=True)]
+            inner = [each.close(some, aim.max_bound, parts < finest) for each, some in zip(opened, asked, strict=True)]
             bound = max(bound, *edges, *inner)
         return bound, seen
 

@@ -79,19 +79,18 @@ class OpenIntervals:
         bound = float(np.where(sampled[:, None], 0.0, tops).max())
         return subdivide(self.player, times, self.rise, self.is_open, parts, (sampled[0], sampled[1])), bound
 
-    def close(self, looked: Subintervals, target: float, refinable: Bools) -> float:
+    def close(self, parts: Subintervals, target: float, refinable: Bools) -> float:
         """Close intervals whose bound is below the target, and those that are not `refinable` (F − 1,).
 
         Returns the largest bound of those that are closed, in m.
         """
-        firsts = np.flatnonzero(np.diff(looked.interval, prepend=-1))
-        intervals = looked.interval[firsts]
-        if not len(intervals):
-            self.is_open = np.zeros_like(self.is_open)
-            return 0.0
-        tops = np.fmax.reduceat(looked.tops, firsts, axis=1)
-        still = (tops > target) & refinable[intervals]
         self.is_open = np.zeros_like(self.is_open)
+        if not len(parts.interval):
+            return 0.0
+        firsts = np.flatnonzero(np.diff(parts.interval, prepend=-1))
+        intervals = parts.interval[firsts]
+        tops = np.fmax.reduceat(parts.tops, firsts, axis=1)
+        still = (tops > target) & refinable[intervals]
         self.is_open[:, intervals] = still
         return float(np.fmax.reduce(np.where(still, 0.0, tops), axis=None))
 

@@ -69,11 +69,9 @@ def merge_surfaces(
     found: list[SkinnedGroups] = []
     rigid: list[Surface] = []
     for each, binding in surfaces:
-        if binding is None and len(each.nodes) == 1 and not len(each.targets):
-            rigid.append(each)
-            continue
-        surface, new = _reduce(each, binding, skeleton)
-        if new is None and len(surface.nodes) == 1 and not len(surface.targets):
+        is_rigid = len(each.nodes) == 1 and not len(each.targets)
+        surface, new = (each, None) if is_rigid and binding is None else _reduce(each, binding, skeleton)
+        if is_rigid and new is None:
             rigid.append(each)
         else:
             found.append(SkinnedGroups(surface, new))

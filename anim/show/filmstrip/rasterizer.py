@@ -50,7 +50,7 @@ def _area(corners: Floats) -> float:
 
 
 def _last_of_equal(corners: Floats) -> Ints:
-    """Indices, increasing, of triangles without those that are equal to a later one, which would be seen of both."""
+    """Indices, increasing, of triangles that equal no later one: of equal ones the last is seen."""
     rows = np.ascontiguousarray(corners[::-1].reshape(len(corners), 9)).view("V72")[:, 0]
     _, first = np.unique(rows, return_index=True)
     return np.sort(len(corners) - 1 - first)

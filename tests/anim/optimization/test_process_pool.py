@@ -98,7 +98,7 @@ if __name__ == "__main__":
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_killed_processes_leave_no_pipe_that_waits(tmp_path: Path) -> None:
-    """Before Python 3.11.4, the thread that sent the next megabyte waited for a reader for ever."""
+    """With Python 3.11.2, the thread that sent the next megabyte waited for a reader for ever."""
     script = tmp_path / "killed.py"
     script.write_text(LARGE_KILLED)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
