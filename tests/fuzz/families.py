@@ -120,6 +120,9 @@ def _caches() -> Iterator[Seed]:
     for ending in CACHE_ENDINGS:
         made = _made(f"bake arm.glb a{ending} --clip bend --fps 4")
         yield Seed(f"a{ending}", made, list(made), CACHE_LINES)
+    for ending in (".usda", ".usdc"):  # a skeleton, which usd-core evaluates
+        made = _made(f"convert arm.glb skinned{ending} --clip bend --fps 4")
+        yield Seed(f"skinned{ending}", made, list(made), CACHE_LINES)
 
 
 def _made(line: str) -> dict[str, bytes]:

@@ -1,0 +1,87 @@
+"""A function that runs in a process of its own, since a native package may crash, hang or print on a hostile file.
+
+The child ends with the block that reads from it, so that a signal to this process is heard while native code runs.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import IO, Any
+
+from anim.errors import AnimError
+from anim.memory import limit_allocations
+
+# The child has this process's path of modules and no other: `-I` leaves out the current folder and $PYTHONPATH.
+PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from anim.caches import child_process; child_process.serve()"
+
+
+class ChildEndedError(Exception):
+    """The child ended before its work did: a crash, or an error that no package of ours raises."""
+
+
+@contextmanager
+def run_in_child(function: Callable[..., Iterator[Any]], *arguments: Any, limit_bytes: int) -> Iterator[Iterator[Any]]:
+    """Provide what a generator function yields in a child process; function and arguments as for `pickle`.
+
+    limit_bytes: of memory that it may allocate (on Linux). Reading raises the function's AnimError or MemoryError, and
+    ChildEndedError if the child ends without one. At the end of the block the child is ended.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-I", "-c", PROGRAM, *sys.path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    with process.stdout:
+        try:
+            _send(process.stdin, pickle.dumps((function, arguments, limit_bytes)))
+            yield _messages(process.stdout)
+        finally:
+            process.kill()
+            process.wait()
+
+
+def serve() -> None:
+    """Run the function that stdin names, and write its messages to stdout; the whole life of the child."""
+    with os.fdopen(0, "rb") as source, os.fdopen(os.dup(1), "wb") as out:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what native packages print
+        function, arguments, limit_bytes = pickle.load(source)
+        try:
+            with limit_allocations(limit_bytes):
+                for message in function(*arguments):
+                    pickle.dump((message, None), out, pickle.HIGHEST_PROTOCOL)
+                    out.flush()
+            end: BaseException | None = StopIteration()
+        except AnimError as error:
+            end = type(error)(error.problem, where=error.where, help=error.help)
+        except MemoryError:
+            end = MemoryError()
+        pickle.dump((None, end), out)
+
+
+def _send(pipe: IO[bytes], data: bytes) -> None:
+    try:
+        with pipe:
+            pipe.write(data)
+    except BrokenPipeError:  # it has ended: reading says so
+        pass
+
+
+def _messages(pipe: IO[bytes]) -> Iterator[Any]:
+    while True:
+        try:
+            message, end = pickle.load(pipe)
+        except (EOFError, pickle.UnpicklingError):
+            raise ChildEndedError from None
+        if isinstance(end, StopIteration):
+            return
+        if end is not None:
+            raise end
+        yield message
