@@ -11,16 +11,34 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
 from anim.caches.storage import COPY_BYTES, Inputs, Outputs
+from anim.errors import OutputError
 
 
 @contextmanager
 def temp_output(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
-    """Yield a path of this extension to write to; its content becomes the output `name`."""
+    """Yield a path of this extension to write to; its content becomes the output `name`.
+
+    Raises OutputError if the package can't write there.
+    """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"output{ending}"
-        yield str(path)
+        try:
+            yield str(path)
+        except RuntimeError as error:  # of native packages, which hide the reason or spread it over many lines
+            help = f"is there room for temporary files in {tempfile.gettempdir()}? TMPDIR names another folder"
+            raise OutputError(f"{name}: can't be written as {ending} in a temporary file", help=help) from error
         with path.open("rb") as source, outputs.create(name) as target:
             shutil.copyfileobj(source, target, COPY_BYTES)
+
+
+def check_free_space(size: int, name: str) -> None:
+    """Raise OutputError unless `size` bytes fit beside the other temporary files: for packages that abort if not."""
+    folder = tempfile.gettempdir()
+    free = shutil.disk_usage(folder).free
+    if size > free:
+        raise OutputError(
+            f"{name}: its {size} bytes don't fit in {folder} ({free} free)", help="TMPDIR names another folder"
+        )
 
 
 @contextmanager

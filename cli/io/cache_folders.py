@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ import numpy as np
 
 from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
-from anim.errors import FormatError
+from anim.errors import FormatError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
 from cli.errors import UsageError
@@ -87,8 +86,16 @@ def _received(stack: ExitStack) -> CacheFolder:
     """Stdin as a file in a temporary folder, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
-    folder = stack.enter_context(tempfile.TemporaryDirectory())
-    path = Path(folder) / "stdin"
-    with path.open("wb") as file:
-        shutil.copyfileobj(sys.stdin.buffer, file, COPY_BYTES)
+    blocks = iter(lambda: sys.stdin.buffer.read(COPY_BYTES), b"")
+    try:
+        first = next(blocks, b"")
+    except OSError as error:
+        raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "stdin"
+    try:
+        with path.open("wb") as file:
+            file.write(first)
+            file.writelines(blocks)
+    except OSError as error:
+        raise not_written("the temporary file for stdin", error).advise("TMPDIR names another folder for it") from None
     return CacheFolder(path)

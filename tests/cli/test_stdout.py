@@ -13,7 +13,7 @@ import pytest
 
 from anim.errors import OutputError
 from cli.io import stdout
-from tests.cli.running import TIMEOUT, refusal, shell, started
+from tests.cli.running import TIMEOUT, help_line, refusal, shell, started
 from tests.files import mark_slow
 
 LIMIT = "export PYTHONDONTWRITEBYTECODE=1; ulimit -f"  # kB a file; Python would leave halves of its compiled modules
@@ -102,3 +102,16 @@ def test_a_full_folder_for_temporary_files_is_named(walk: Path, tmp_path: Path) 
     line = f"TMPDIR='{tmp_path}' gltf-anim bake walk.glb --clip walk --fps 30 > /dev/null"
     shell(line, tmp_path).product()
     assert refusal(shell(f"{LIMIT} 100; {line}", tmp_path), 3).startswith(f"gltf-anim: {tmp_path}/")
+
+
+@pytest.mark.parametrize("ending", ["usdc", "exr"])
+def test_room_for_temporary_files_can_end(ending: str, walk: Path, tmp_path: Path) -> None:
+    """Of stdin, which is read more than once, and of packages that write only by name."""
+    shell("gltf-anim bake walk.glb a.npz --clip walk --fps 30", tmp_path).product()
+    run = shell(f"{LIMIT} 4; cat a.npz | gltf-anim convert-cache - out.{ending}", tmp_path)
+    assert refusal(run, 3) == "gltf-anim: the temporary file for stdin: can't be written (file too large)"
+    assert "TMPDIR" in help_line(run)
+    run = shell(f"{LIMIT} 4; gltf-anim convert-cache a.npz out.{ending}", tmp_path)
+    assert refusal(run, 3) == f"gltf-anim: out.{ending}: can't be written as .{ending} in a temporary file"
+    assert "TMPDIR" in help_line(run)
+    assert [path.name for path in tmp_path.glob("out*")] == []

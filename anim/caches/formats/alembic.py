@@ -28,6 +28,8 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
     abc, geom, core, imath = _package()
     vertex = geom.GeometryScope.kVertexScope
     coordinates = None if writing.source is None else mesh_materials(cache, writing.source.document, "").coordinates
+    vectors = cache.vertex_count * cache.frame_count * (1 + cache.has_normals) + len(cache.faces)
+    temporary_files.check_free_space(12 * vectors, outputs.main)  # alembic3d aborts the process where a write fails
     with temporary_files.temp_output(outputs, outputs.main, ".abc") as path:
         archive = abc.OArchive(path)
         sampling = _time_sampling(core, cache.times)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 from anim.caches.options import WriteOptions
 from anim.caches.source_document.bake_source import BakeSource
 from anim.caches.storage import Memory
-from anim.errors import UnsupportedError
+from anim.errors import OutputError, UnsupportedError
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.model import FrameChunk, VertexCache
@@ -90,3 +92,10 @@ def test_rows_in_any_memory_order(tmp_path: Path) -> None:
 def test_it_is_not_read() -> None:
     with pytest.raises(UnsupportedError, match="abc is only written, not read"):
         opened(written(cache(), "a.abc")[0])
+
+
+def test_a_full_folder_for_temporary_files_is_refused_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """alembic3d aborts the process where a write fails."""
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=10))
+    with pytest.raises(OutputError, match="don't fit"):
+        written(cache(), "a.abc")
