@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 
 MIN_DEPTH = 256  # levels of a tree that is divided: with fewer a step per level is faster
 MAX_WIDTH = 16  # nodes per level, on average, of such a tree
@@ -52,6 +52,30 @@ def subtree_sums(parents: Ints, values: Floats) -> Floats:
         if above[node] >= 0:
             total[above[node]] += total[node]
     return np.array(total, np.float64)
+
+
+def with_descendants(parents: Ints, chosen: Bools) -> Bools:
+    """Return the mask (N,) of some nodes and of all below them. parents: (N,), −1 for roots.
+
+    Each step looks twice as far up, so that a chain of N nodes takes log2(N) steps.
+    """
+    found, above = chosen.copy(), parents.copy()
+    while len(some := np.flatnonzero(above >= 0)):
+        found[some] |= found[above[some]]
+        above[some] = above[above[some]]
+    return found
+
+
+def with_ancestors(parents: Ints, chosen: Bools) -> Bools:
+    """Return the mask (N,) of some nodes and of all above them. parents: (N,), −1 for roots.
+
+    In steps as of `with_descendants`.
+    """
+    found, above = chosen.copy(), parents
+    while len(some := above[found & (above >= 0)]):
+        found[some] = True
+        above = np.where(above >= 0, above[above], -1)
+    return found
 
 
 def _by_level(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose) -> Floats:

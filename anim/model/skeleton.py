@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -36,9 +37,11 @@ class Skeleton:
     sheared_local: Floats = field(default_factory=lambda: np.empty((0, 3, 4)))
     morphed: tuple[MorphedNode, ...] = ()
     _levels: Any = field(init=False, repr=False)  # tuple of (M,) for each depth
+    _derived: Any = field(init=False, repr=False)  # arrays by the function that computed them
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return arrays.reduce_fields(self)
+        restore, (kind, values) = arrays.reduce_fields(self)
+        return restore, (kind, [*values[:-1], {}])
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
@@ -55,6 +58,7 @@ class Skeleton:
         if len(self.sheared_local) != len(self.sheared):
             raise ShapeError(f"sheared_local has {len(self.sheared_local)} matrices for {len(self.sheared)} nodes")
         set_field(self, "_levels", _find_levels(self.parents))
+        set_field(self, "_derived", {})
 
     def __repr__(self) -> str:
         roots = np.flatnonzero(self.parents < 0)
@@ -77,6 +81,13 @@ class Skeleton:
         found[node] = True
         for level in self.levels()[1:]:
             found[level] |= found[self.parents[level]]
+        return found
+
+    def derive(self, compute: Callable[[Skeleton], Floats]) -> Floats:
+        """Return the array that a function computes from this skeleton, read-only: computed once, kept here."""
+        if compute not in self._derived:
+            self._derived[compute] = arrays.own(compute(self))
+        found: Floats = self._derived[compute]
         return found
 
     def levels(self) -> list[Ints]:
@@ -105,24 +116,22 @@ def nearest_ancestors(skeleton: Skeleton, among: Container[int]) -> list[int]:
 
 
 def _find_levels(parents: Ints) -> tuple[Ints, ...]:
-    """The nodes of each depth; raises FormatError for a cycle or a parent that does not exist."""
+    """The nodes of each depth; raises FormatError for a cycle or a parent that does not exist.
+
+    Views of one array: a chain has as many levels as nodes.
+    """
     if len(parents) and (parents.min() < -1 or parents.max() >= len(parents)):
         raise FormatError("a node's parent does not exist")
-    levels: list[Ints] = []
-    done = 0
-    level = np.flatnonzero(parents < 0)
-    children = _children(parents)
-    while len(level):
-        levels.append(arrays.freeze(level))
-        done += len(level)
-        level = np.array([c for p in level.tolist() for c in children.get(p, ())], dtype=np.int64)
-    if done != len(parents):
+    by_parent = np.argsort(parents, kind="stable")
+    ends = np.cumsum(np.bincount(parents + 1, minlength=len(parents) + 1)).tolist()  # of children, after the roots
+    children, order, starts = by_parent.tolist(), by_parent[: ends[0]].tolist(), [0]
+    while starts[-1] < len(order):
+        level = order[starts[-1] :]
+        starts.append(len(order))
+        for node in level:
+            if ends[node] < ends[node + 1]:
+                order += children[ends[node] : ends[node + 1]]
+    if len(order) != len(parents):
         raise FormatError("nodes form a cycle (expected trees)")
-    return tuple(levels)
-
-
-def _children(parents: Ints) -> dict[int, list[int]]:
-    children: dict[int, list[int]] = {}
-    for child, parent in enumerate(parents.tolist()):
-        children.setdefault(parent, []).append(child)
-    return children
+    found = arrays.freeze(np.array(order, np.int64))
+    return tuple(found[start:end] for start, end in pairwise(starts))

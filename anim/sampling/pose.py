@@ -187,7 +187,11 @@ def rest_pose(skeleton: Skeleton) -> Pose:
 
 
 def rest_world(skeleton: Skeleton) -> Floats:
-    """Return world_from_node (N, 3, 4) of every node in the rest pose."""
+    """Return world_from_node (N, 3, 4) of every node in the rest pose, read-only: computed once for each skeleton."""
+    return skeleton.derive(_compute_rest_world)
+
+
+def _compute_rest_world(skeleton: Skeleton) -> Floats:
     return PosedSkeleton.at_rest(skeleton).world[:, 0]
 
 

@@ -21,16 +21,17 @@ def read_scene(
     reporter: Reporter,
     *,
     accessors: Accessors | None = None,
+    skeleton: Skeleton | None = None,
     normals: bool = False,
     tangents: bool = False,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
     """Return the scene of a document; warn of normalized skin weights, ignored mesh copies and pointers without effect.
 
-    name: of the file, for messages. normals, tangents: whether to read those too.
-    nodes: gives the nodes of the command's meshes; None for all.
+    name: of the file, for messages. accessors, skeleton: the document's, if the caller has them.
+    normals, tangents: whether to read those too. nodes: gives the nodes of the command's meshes; None for all.
     """
-    found = reader.scene(document, accessors, normals=normals, tangents=tangents)
+    found = reader.scene(document, accessors, skeleton, normals=normals, tangents=tangents)
     chosen = nodes(found)
     for bad in unnormalized_weights(each for each in found.instances if chosen is None or each.node in chosen):
         for words in bad.in_words():

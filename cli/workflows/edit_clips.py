@@ -129,7 +129,7 @@ def check_clips(path: str, selection: Selection, reporter: text.Reporter) -> Non
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
     """The scene, without meshes if their vertices can't be read."""
     try:
-        return reader.scene(document, accessors)
+        return reader.scene(document, accessors, skeleton)
     except AnimError:  # reported by `_measured`
         return Scene(skeleton, ())
 
@@ -143,7 +143,7 @@ def _measured(
 ) -> EditResult:
     at_nodes = False
     try:
-        scene = scenes.read_scene(source.document, source.name, reporter, accessors=accessors)
+        scene = scenes.read_scene(source.document, source.name, reporter, accessors=accessors, skeleton=skeleton)
     except AnimError as error:  # unreadable vertices don't prevent a change of keys
         hint = f" ({error.help})" if error.help else ""
         reporter.warn(f"measured at nodes, not on the surface: {error}{hint}")

@@ -89,11 +89,17 @@ def names(document: Document) -> tuple[str, ...]:
 
 
 def scene(
-    document: Document, accessors: Accessors | None = None, *, normals: bool = False, tangents: bool = False
+    document: Document,
+    accessors: Accessors | None = None,
+    known: Skeleton | None = None,
+    *,
+    normals: bool = False,
+    tangents: bool = False,
 ) -> Scene:
     """Return the skeleton and its meshes, nodes depth-first in the order of the file's scenes.
 
-    normals, tangents: read those of vertices and morph targets too. A mesh with EXT_mesh_gpu_instancing is included
+    known: the document's skeleton, if the caller has it. normals, tangents: read those of vertices and morph targets
+    too. A mesh with EXT_mesh_gpu_instancing is included
     once, on its node (`instanced_nodes`).
     Raises UnsupportedError if vertices cannot be read: Draco without the package DracoPy, an unknown compression,
     EXT_mesh_gpu_instancing where the file requires it.
@@ -106,14 +112,14 @@ def scene(
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     nodes = json_array(document.json, "nodes")
     instances = []
-    for number in depth_first(document.json):
+    for number in depth_first(document.json, None if known is None else known.parents.tolist()):
         node = nodes[number]
         if "mesh" not in node:
             continue
         skin = skins[node["skin"]] if "skin" in node else None
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
-    return Scene(skeleton(document), tuple(instances))
+    return Scene(known or skeleton(document), tuple(instances))
 
 
 def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
@@ -125,10 +131,13 @@ def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
     )
 
 
-def depth_first(json: Json) -> Iterator[int]:
-    """Yield node indices depth-first: from the scenes' roots, each once, then from other roots."""
+def depth_first(json: Json, parents: Sequence[int] | None = None) -> Iterator[int]:
+    """Yield node indices depth-first: from the scenes' roots, each once, then from other roots.
+
+    parents: (N,) of each node, −1 for roots, if the caller has them.
+    """
     nodes = json_array(json, "nodes")
-    parents = hierarchy.parents(json)
+    parents = hierarchy.parents(json) if parents is None else parents
     roots = [root for scene in json_array(json, "scenes") for root in scene.get("nodes", ())]
     roots += [i for i, parent in enumerate(parents) if parent < 0]
     seen: set[int] = set()

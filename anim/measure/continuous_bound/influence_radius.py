@@ -12,6 +12,8 @@ from anim.measure.error.combined_groups import CombinedGroups
 from anim.measure.error.point_groups import Binding, PointGroups, SkinnedGroups
 from anim.measure.error.shell_points import ShellPoints
 
+BLOCK = 65_536  # points per step, each about 200 bytes
+
 
 class Morphing(NamedTuple):
     """Displacement of one surface's points by morph weights.
@@ -86,10 +88,12 @@ def _arms(part: SkinnedGroups, points: Floats, bind: Floats, one: float) -> Floa
     one: 1 for points, 0 for directions.
     """
     result = np.zeros(len(part.used))
-    for joints, weights in zip(part.surface.joints.T, part.surface.weights.T, strict=True):
-        carried: Bools = np.asarray(weights > 0)
-        matrices = bind[joints[carried]]
-        moved = np.einsum("vij,vj->vi", matrices[..., :3], points[carried]) + one * matrices[..., 3]
-        place = np.searchsorted(part.used, joints[carried])
-        np.maximum.at(result, place, np.sqrt((moved * moved).sum(axis=1)))
+    influences = list(zip(part.surface.joints.T, part.surface.weights.T, strict=True))
+    for some in (slice(start, start + BLOCK) for start in range(0, len(points), BLOCK)):
+        for joints, weights in influences:
+            carried: Bools = np.asarray(weights[some] > 0)
+            chosen = joints[some][carried]
+            matrices = bind[chosen]
+            moved = np.einsum("vij,vj->vi", matrices[..., :3], points[some][carried]) + one * matrices[..., 3]
+            np.maximum.at(result, np.searchsorted(part.used, chosen), np.sqrt((moved * moved).sum(axis=1)))
     return result

@@ -14,6 +14,7 @@ from anim.measure.error.shell_points import ShellPoints
 from anim.sampling.pose import PosedSkeleton
 
 NUM_CORNERS = 8  # of a joint's box
+IDENTITY = np.eye(4)[:3]
 
 
 class CombinedGroups:
@@ -34,7 +35,7 @@ class CombinedGroups:
         products = [product for one in each for product in one.products]
         corners = np.concatenate([one.corners for one in each])
         self._is_same = np.array_equal(self._bind, self._new_bind)
-        if self._is_same:  # in the space of the joints, which is the same in both versions
+        if self._is_same and not (self._bind == IDENTITY).all():  # in the joints' space, the same in both versions
             corners = matrix.apply(self._bind, corners)
             products = [_in_joints(one, self._bind[joints]) for one, joints in zip(products, self.reach, strict=True)]
         fraction = np.repeat([one.fraction for one in each], np.diff(self._joints))[:, None]
@@ -114,7 +115,7 @@ def _nodes(part: SkinnedGroups | ShellPoints, version: int) -> Ints:
 
 def _bind(part: SkinnedGroups | ShellPoints, version: int) -> Floats:
     if isinstance(part, ShellPoints):
-        return np.repeat(np.eye(4)[None, :3], len(part.nodes), axis=0)
+        return np.broadcast_to(IDENTITY, (len(part.nodes), 3, 4))
     return (part.old, part.new)[version].bind[part.used]
 
 

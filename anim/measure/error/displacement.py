@@ -71,8 +71,18 @@ class SkinnedDisplacement:
 
     def vectors(self, group: int, frames: Ints) -> Floats:
         """Return the vectors (V_g, 3, f) of a group's vertices in some frames."""
+        return self._products(self._groups.products[group], group, frames)
+
+    def lengths(self, group: int, frames: Ints) -> Floats:
+        """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
+        products = self._groups.products[group]
+        parts = np.array_split(products, len(products) * len(frames) // CHUNK + 1)
+        return np.concatenate([_lengths(self._products(part, group, frames)) for part in parts])
+
+    def _products(self, products: Floats, group: int, frames: Ints) -> Floats:
+        """The vectors (V, 3, f) of some of a group's vertices, by their products."""
         chosen = self._moved[self._groups.reach[group]][:, frames].transpose(0, 3, 2, 1)  # (J_g, 4, 3, f)
-        flat = self._groups.products[group] @ chosen.reshape(-1, 3 * len(frames))
+        flat = products @ chosen.reshape(-1, 3 * len(frames))
         return np.asarray(flat.reshape(-1, 3, len(frames)))
 
     def uniform_vectors(self, frames: Ints) -> Floats | None:
@@ -184,7 +194,13 @@ class MaxDisplacement(NamedTuple):
 
 def lengths(field: DisplacementField, group: int, frames: Ints) -> Floats:
     """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
-    vectors = field.vectors(group, frames)
+    if isinstance(field, SkinnedDisplacement):
+        return field.lengths(group, frames)
+    return _lengths(field.vectors(group, frames))
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """Lengths (V, f) of vectors (V, 3, f), which are overwritten."""
     vectors *= vectors
     return np.asarray(np.sqrt(vectors.sum(axis=1)))
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.error.displacement import MaxDisplacement
 from anim.measure.error.point_groups import Binding, SkinnedGroups
@@ -15,32 +15,29 @@ from anim.measure.error.reduced_skeleton import IDENTITY, ReducedSkeleton
 from anim.measure.error.surface import Surface
 
 
-class RigidPoints(NamedTuple):
-    """Points (V, 3) of a mesh, or around a node, in the space of the kept node that they follow."""
-
-    name: str
-    points: Floats
-
-
 class MergedGroups(SkinnedGroups):
-    """Points of several meshes, or of shells, that follow one node. vertices: whether they are those of meshes."""
+    """Points of several meshes, or around several nodes, that follow one kept node, in its space.
 
-    def __init__(self, node: int, rigid: Sequence[RigidPoints], *, vertices: bool) -> None:
-        self._names = [each.name for each in rigid]
-        self._firsts = np.cumsum([0, *(len(each.points) for each in rigid)])
+    counts: number of points of each mesh or node, whose name `called` gives by its place there. points: (V, 3) m, of
+    one after the other. vertices: whether they are those of meshes, or stand for such.
+    """
+
+    def __init__(
+        self, node: int, counts: Ints, points: Floats, called: Callable[[int], str], *, vertices: bool
+    ) -> None:
+        self._called = called
+        self._firsts = np.concatenate(([0], np.cumsum(counts)))
         self.has_vertices = vertices
-        points = np.concatenate([each.points for each in rigid])
-        joints = np.zeros((len(points), 1), np.int64)
-        targets = np.empty((0, len(points), 3))
+        one = (len(points), 1)
         super().__init__(
             Surface(
-                rigid[0].name,
+                called(0),
                 np.array([node]),
                 IDENTITY,
                 points,
-                targets,
-                joints,
-                np.ones((len(points), 1)),
+                np.empty((0, len(points), 3)),
+                np.broadcast_to(np.int64(0), one),
+                np.broadcast_to(1.0, one),
                 -1,
                 np.empty(0),
             )
@@ -53,7 +50,7 @@ class MergedGroups(SkinnedGroups):
 
     def name_of(self, found: MaxDisplacement) -> str:
         """Return the name of the mesh, or of a shell's node; of the first one if only a bound was evaluated."""
-        return self._names[self._part(max(super().vertex(found), 0))]
+        return self._called(self._part(max(super().vertex(found), 0)))
 
     def _part(self, point: int) -> int:
         return int(np.searchsorted(self._firsts, point, side="right")) - 1
@@ -94,21 +91,44 @@ def _merge_rigid(surfaces: Sequence[Surface], skeleton: ReducedSkeleton) -> tupl
     for size in sorted(set(sizes[moving].tolist())):
         some = np.flatnonzero(moving & (sizes == size)).tolist()
         points.update(zip(some, matrix.apply(bind[some], np.stack([surfaces[i].points for i in some])), strict=True))
-    rigid: dict[int, list[RigidPoints]] = {}
-    for i in np.flatnonzero(moving).tolist():
-        rigid.setdefault(int(anchors[i]), []).append(RigidPoints(surfaces[i].name, points[i]))
-    groups = [MergedGroups(node, parts, vertices=True) for node, parts in rigid.items()]
+    groups = []
+    for anchor, members in _by_anchor(anchors, moving):
+        all_points = np.concatenate([points[i] for i in members.tolist()])
+        names = [surfaces[i].name for i in members.tolist()]
+        groups.append(MergedGroups(anchor, sizes[members], all_points, names.__getitem__, vertices=True))
     return groups, int(sizes[~moving].sum())
 
 
-def merge_shells(nodes: Ints, points: Floats, names: Sequence[str], skeleton: ReducedSkeleton) -> list[MergedGroups]:
-    """Return the groups of points (S, P, 3) around nodes (S,), in their spaces; without those that do not move."""
-    anchors, moved = skeleton.anchors[nodes], matrix.apply(skeleton.offsets[nodes], points)
+def merge_points(
+    nodes: Ints, points: Floats, called: Callable[[int], str], skeleton: ReducedSkeleton, *, vertices: bool
+) -> list[MergedGroups]:
+    """Return the groups of points (S, P, 3) around nodes (S,), in their spaces; without those that do not move.
+
+    called: gives the name of a node. vertices: whether the points stand for vertices.
+    """
+    anchors = skeleton.anchors[nodes]
+    members = _by_anchor(anchors, anchors != skeleton.origin)
+    chosen = np.concatenate([np.empty(0, np.int64), *(each for _, each in members)])
+    moved = matrix.apply(skeleton.offsets[nodes[chosen]], points[chosen])
+    ends = np.cumsum([len(each) for _, each in members])
     found = []
-    for anchor in sorted(set(anchors[anchors != skeleton.origin].tolist())):
-        rigid = [RigidPoints(names[nodes[i]], moved[i]) for i in np.flatnonzero(anchors == anchor).tolist()]
-        found.append(MergedGroups(anchor, rigid, vertices=False))
-    return found
+    for (anchor, each), end in zip(members, ends.tolist(), strict=True):
+        own = moved[end - len(each) : end].reshape(-1, 3)
+        name = partial(_called_member, called, nodes[each])
+        found.append(MergedGroups(anchor, np.full(len(each), points.shape[1]), own, name, vertices=vertices))
+    return found if vertices else sorted(found, key=lambda each: each.node(0))
+
+
+def _called_member(called: Callable[[int], str], nodes: Ints, place: int) -> str:
+    return called(int(nodes[place]))
+
+
+def _by_anchor(anchors: Ints, moving: Bools) -> list[tuple[int, Ints]]:
+    """Each anchor of the moving members with their indices, in the order of the first of each."""
+    chosen = np.flatnonzero(moving)
+    chosen = chosen[np.argsort(anchors[chosen], kind="stable")]
+    members = np.split(chosen, np.flatnonzero(np.diff(anchors[chosen])) + 1) if len(chosen) else []
+    return sorted(((int(anchors[each[0]]), each) for each in members), key=lambda each: int(each[1][0]))
 
 
 def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton) -> tuple[Surface, Binding | None]:

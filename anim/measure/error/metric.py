@@ -17,14 +17,14 @@ from anim.arrays import Floats, Ints, unique_sorted
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import max_displacement
-from anim.measure.error.merged_groups import merge_shells, merge_surfaces
+from anim.measure.error.merged_groups import merge_points, merge_surfaces
 from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.reduced_skeleton import ReducedSkeleton, reduce_skeletons
 from anim.measure.error.sample_times import dense_times
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
-from anim.measure.error.surface import Surface, diagonal, has_vertices, surfaces
+from anim.measure.error.surface import NUM_CORNERS, Surface, diagonal, has_vertices, node_cubes, surfaces
 from anim.model import Clip, Pose, Scene, Skeleton
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PosedSkeleton, PoseSampler
@@ -101,30 +101,43 @@ class ErrorMetric:
     ) -> None:
         self.scene, self.other = scene, other or scene
         self.diagonal = diagonal(scene)
-        found = surfaces(scene) if shell is None or has_vertices(scene) else []
+        found = surfaces(scene) if has_vertices(scene) else []
         self.pairs: Correspondence = match_scenes(scene, self.other, found)
+        if shell is None and not found and (self.pairs.nodes < 0).any():
+            found = surfaces(scene)
+            self.pairs = match_scenes(scene, self.other, found)
         self._reduced = None if clips is None else self._reduce(clips, found)
         self.skeletons = (scene.skeleton, self.other.skeleton) if self._reduced is None else self._reduced.versions
+        nodes, points = self._around_nodes(found, shell)
+        self.has_shell = shell is not None and len(nodes) > 0
+        has_cubes = shell is None and not found
         self.parts: list[PointGroups] = []
         self.num_static_points = 0
-        nodes = np.empty(0, np.int64)
-        if shell is not None:
-            nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, found) & (self.pairs.nodes >= 0))
-        self.has_shell = len(nodes) > 0
         if self._reduced is None:
             self.parts += [SkinnedGroups(*each) for each in self.pairs.surfaces]
-            if shell is not None:
-                self.parts.append(ShellPoints(scene.skeleton, nodes, self.pairs.nodes[nodes], shell * self.diagonal))
+            if shell is not None or has_cubes:
+                self.parts.append(ShellPoints(nodes, self.pairs.nodes[nodes], points, has_vertices=has_cubes))
         else:
             groups, self.num_static_points = merge_surfaces(self.pairs.surfaces, self._reduced)
-            points = shell_points(scene.skeleton, nodes, (shell or 0.0) * self.diagonal)
-            names = [scene.skeleton.display_name(node) for node in range(len(scene.skeleton))]
-            shells = merge_shells(nodes, points, names, self._reduced)
+            around = merge_points(nodes, points, scene.skeleton.display_name, self._reduced, vertices=has_cubes)
             if not self.pairs.surfaces:
-                self.num_static_points = points[..., 0].size - sum(len(g) for each in shells for g in each.groups)
-            self.parts += [*groups, *shells]
+                self.num_static_points = points[..., 0].size - sum(len(g) for each in around for g in each.groups)
+            self.parts += [*groups, *around]
         self.combined = combine_groups(self.parts)
         self._last: tuple[Clip, Clip, tuple[PoseSampler, PoseSampler]] | None = None
+
+    def _around_nodes(self, surfaces: Sequence[Surface], shell: float | None) -> tuple[Ints, Floats]:
+        """The nodes (S,) that are measured at points (S, P, 3) around them, in their spaces.
+
+        On shells those without vertices; on cubes all of a scene without any surface.
+        """
+        if shell is not None:
+            bare = nodes_without_vertices(self.scene.skeleton, surfaces)
+            nodes = np.flatnonzero(bare & (self.pairs.nodes >= 0))
+            return nodes, shell_points(self.scene.skeleton, nodes, shell * self.diagonal)
+        if surfaces:
+            return np.empty(0, np.int64), np.empty((0, NUM_CORNERS, 3))
+        return np.arange(len(self.scene.skeleton)), node_cubes(self.scene, self.diagonal)
 
     def _reduce(self, clips: Iterable[Clip], surfaces: Sequence[Surface]) -> ReducedSkeleton | None:
         """The skeletons without static nodes, None where that is not possible or not worth it."""

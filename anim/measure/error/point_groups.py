@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.measure.error.displacement import (
     BoundGroups,
@@ -97,16 +97,13 @@ class SkinnedGroups:
         self.surface = surface
         self.old = Binding(surface.nodes, surface.bind, surface.owner, surface.rest_weights)
         self.new = new or self.old
-        self.fraction = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
-        carrying = surface.weights > 0
-        self.used = np.array(sorted(set(surface.joints[carrying].tolist())), np.int64)
-        place = np.full(len(surface.nodes), -1)
-        place[self.used] = np.arange(len(self.used))
-        self._influences = np.where(carrying, place[surface.joints], 0)  # (V, I), into `used`
-        found = self._grouped(carrying)
+        rest = surface.points
+        if len(surface.targets):
+            rest = rest + np.tensordot(surface.rest_weights, surface.targets, axes=1)
+        self.fraction, self.used, self._influences = self._influenced()
+        found = self._grouped()
         self._leaders, self.groups = list(found), list(found.values())
-        self.reach = [np.array(sorted(set(self._influences[g][carrying[g]].tolist())), np.int64) for g in self.groups]
-        rest = surface.points + np.tensordot(surface.rest_weights, surface.targets, axes=1)
+        self.reach = [self._reach(group) for group in self.groups]
         products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
         self.bound_groups = BoundGroups(self.reach, products, self._boxes(rest), self.fraction)
         corners = self._boxes(surface.points) if len(surface.targets) else self.bound_groups.corners
@@ -162,26 +159,50 @@ class SkinnedGroups:
         """Return the index in the mesh of the vertex that was found, −1 if only a bound was evaluated."""
         return int(self.groups[found.group][found.vertex]) if found.vertex >= 0 else -1
 
-    def _grouped(self, carrying: Bools) -> dict[int, Ints]:
+    def _influenced(self) -> tuple[float, Ints, Ints]:
+        """The largest sum of skin weights, the joints with influence (J,), and those of vertices (V, I) into them."""
+        surface = self.surface
+        if surface.is_rigid:  # often one of thousands, or with points of thousands of nodes
+            return 1.0, np.zeros(1, np.int64), surface.joints
+        carrying = surface.weights > 0
+        used = np.array(sorted(set(surface.joints[carrying].tolist())), np.int64)
+        place = np.full(len(surface.nodes), -1)
+        place[used] = np.arange(len(used))
+        fraction = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
+        return fraction, used, np.where(carrying, place[surface.joints], 0)
+
+    def _grouped(self) -> dict[int, Ints]:
         """Indices of the vertices by the joint with the largest weight; without vertices that have none."""
         if not len(self.used):
             return {}
+        if self.surface.is_rigid:
+            return {0: np.arange(len(self.surface.points))}
         first = self.surface.weights.argmax(axis=1)
         leader = np.take_along_axis(self._influences, first[:, None], axis=1)[:, 0]
-        leader = np.where(carrying.any(axis=1), leader, -1)
+        leader = np.where((self.surface.weights > 0).any(axis=1), leader, -1)
         return {joint: group for joint in range(len(self.used)) if len(group := np.flatnonzero(leader == joint))}
+
+    def _reach(self, group: Ints) -> Ints:
+        """The joints with influence on a group, as indices into `used`."""
+        if self.surface.is_rigid:
+            return self.used
+        carrying = self.surface.weights[group] > 0
+        return np.array(sorted(set(self._influences[group][carrying].tolist())), np.int64)
 
     def _boxes(self, points: Floats) -> Floats:
         """Corners (J, 8, 3) of the box around all vertices with influence of each used joint."""
+        if self.surface.is_rigid:
+            return _box(points)[None]
         carrying = self.surface.weights > 0
         corners = []
         for joint in range(len(self.used)):
-            carried = points[((self._influences == joint) & carrying).any(axis=1)]
-            corners.append(np.where(SIDES < 0, carried.min(axis=0), carried.max(axis=0)))
+            corners.append(_box(points[((self._influences == joint) & carrying).any(axis=1)]))
         return np.array(corners).reshape(-1, 8, 3)
 
     def _products(self, points: Floats, group: Ints, reach: Ints) -> Floats:
         """Factors of matrices (V_g, J_g · 4): skin weight times x, y, z, 1, per joint with influence."""
+        if self.surface.is_rigid:
+            return np.concatenate((points, np.ones((len(points), 1))), axis=1)
         result = np.zeros((len(group), len(reach), 4))
         rows = np.arange(len(group))
         whole = np.column_stack((points[group], np.ones(len(group))))
@@ -200,3 +221,8 @@ class SkinnedGroups:
             for i in range(len(frames)):
                 result[..., i] += sign * skin_points(self.surface, points[i], bound[:, i])
         return result
+
+
+def _box(points: Floats) -> Floats:
+    """Corners (8, 3) of the box around points (V, 3)."""
+    return np.where(SIDES < 0, points.min(axis=0), points.max(axis=0))

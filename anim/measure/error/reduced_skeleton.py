@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.maths import matrix, quaternion
+from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Skeleton, parse_weight_pointer
 from anim.sampling.pose import rest_pose
 from anim.sampling.world import local_by_node
@@ -91,7 +91,10 @@ def _reduce(one: Skeleton, other: Skeleton, moves: Bools, kept: Bools) -> Reduce
     local = local_by_node(one, rest_pose(one))[:, 0]
     local[moves] = IDENTITY
     rotation = np.where(moves[:, None], (0.0, 0.0, 0.0, 1.0), one.rotation)
-    offsets, rotations, tops = _accumulate(local, rotation, np.where(moves, -1, one.parents))
+    above = np.where(moves, -1, one.parents)
+    offsets, tops = _accumulate(local, above)
+    turned = hierarchy.with_ancestors(above, kept & ~moves)
+    rotations = _accumulate_rotations(rotation, np.where(turned, above, -1))
     nodes = np.flatnonzero(kept)
     index = np.full(len(one) + 1, len(nodes))  # of what is not kept: the origin
     index[nodes] = np.arange(len(nodes))
@@ -125,16 +128,25 @@ def _version(
     )
 
 
-def _accumulate(local: Floats, rotations: Floats, parents: Ints) -> tuple[Floats, Floats, Ints]:
-    """The products of matrices and of rotations from each node's root on, and that root.
+def _accumulate(local: Floats, parents: Ints) -> tuple[Floats, Ints]:
+    """The products of matrices from each node's root on, and that root.
 
     Each step doubles the number of factors, so that a chain of N nodes takes log2(N) steps.
     """
     tops = np.arange(len(parents))
-    local, rotations, parents = local.copy(), rotations.copy(), parents.copy()
+    local, parents = local.copy(), parents.copy()
     while len(some := np.flatnonzero(parents >= 0)):
         above = parents[some]
         local[some] = matrix.multiply(local[above], local[some])
-        rotations[some] = quaternion.normalize(quaternion.multiply(rotations[above], rotations[some]))
         tops[some], parents[some] = tops[above], parents[above]
-    return local, rotations, tops
+    return local, tops
+
+
+def _accumulate_rotations(rotations: Floats, parents: Ints) -> Floats:
+    """The products of rotations from each node's root on, in as many steps."""
+    rotations, parents = rotations.copy(), parents.copy()
+    while len(some := np.flatnonzero(parents >= 0)):
+        above = parents[some]
+        rotations[some] = quaternion.normalize(quaternion.multiply(rotations[above], rotations[some]))
+        parents[some] = parents[above]
+    return rotations

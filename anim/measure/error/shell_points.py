@@ -1,31 +1,32 @@
-"""Shells: six points around each node that moves no vertex, such as a socket, a camera or a light."""
+"""Points around nodes: shells of those that move no vertex, such as a socket, a camera or a light, or cubes of all."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
+from anim.maths import hierarchy
 from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
-from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.surface import Surface
 from anim.model import Skeleton
 from anim.sampling.pose import PosedSkeleton
 
 
 class ShellPoints:
-    """Six points at `radius` (m, in the rest pose) along the axes of some nodes, each node a group.
+    """P points around each of some nodes, each node a group.
 
-    nodes, partners: (S,) their indices in the scenes before and after. points: (S, 6, 3) m, in the nodes' spaces.
+    nodes, partners: (S,) their indices in the scenes before and after. points: (S, P, 3) m, in the nodes' spaces.
+    has_vertices: whether they stand for vertices, as the cubes of a scene without any do; shells don't.
     reach: of each group its node, as an index into `nodes`. bound_groups: the points, in the nodes' spaces.
     """
 
-    def __init__(self, skeleton: Skeleton, nodes: Ints, partners: Ints, radius: float) -> None:
-        self.nodes, self.partners = nodes, partners
-        points = shell_points(skeleton, nodes, radius)
-        whole = np.concatenate((points, np.ones((len(nodes), 6, 1))), axis=-1)
-        self.points = points
-        self.groups: list[Ints] = [np.arange(6, dtype=np.int64)] * len(nodes)
-        self.reach: list[Ints] = [np.array([i]) for i in range(len(nodes))]
+    def __init__(self, nodes: Ints, partners: Ints, points: Floats, *, has_vertices: bool = False) -> None:
+        self.nodes, self.partners, self.points, self.has_vertices = nodes, partners, points, has_vertices
+        whole = np.concatenate((points, np.ones((*points.shape[:2], 1))), axis=-1)
+        self.groups: list[Ints] = [np.arange(points.shape[1])] * len(nodes)
+        self.reach: list[Ints] = list(np.arange(len(nodes))[:, None])
         self.bound_groups = BoundGroups(self.reach, list(whole), points)
 
     @property
@@ -58,12 +59,11 @@ class ShellPoints:
         return int(self.nodes[joint])
 
     def vertex(self, found: MaxDisplacement) -> int:
-        """Return −1: these points are no vertices."""
-        del found
-        return -1
+        """Return the index of the point that was found, −1 of a shell: its points are no vertices."""
+        return found.vertex if self.has_vertices else -1
 
 
-def nodes_without_vertices(skeleton: Skeleton, surfaces: list[Surface]) -> Bools:
+def nodes_without_vertices(skeleton: Skeleton, surfaces: Sequence[Surface]) -> Bools:
     """Return the mask (N,) of nodes that influence no vertex, and none of whose descendants does.
 
     A node with a skinned mesh is not among them either: its own position has no effect.
@@ -71,7 +71,6 @@ def nodes_without_vertices(skeleton: Skeleton, surfaces: list[Surface]) -> Bools
     shown = np.zeros(len(skeleton), np.bool_)
     for surface in surfaces:
         shown[surface.nodes[surface.joints[surface.weights > 0]]] = True
-    for level in reversed(skeleton.levels()[1:]):
-        shown[skeleton.parents[level[shown[level]]]] = True
+    shown = hierarchy.with_ancestors(skeleton.parents, shown)
     shown[[surface.owner for surface in surfaces]] = True
     return ~shown

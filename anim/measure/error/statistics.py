@@ -123,7 +123,7 @@ def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
 
 
 def _is_shell(part: PointGroups) -> bool:
-    return isinstance(part, ShellPoints) or (isinstance(part, MergedGroups) and not part.has_vertices)
+    return isinstance(part, ShellPoints | MergedGroups) and not part.has_vertices
 
 
 def _percentile(values: Floats, share: float) -> float:

@@ -14,6 +14,8 @@ from anim.sampling import rest_world
 
 SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's diagonal
 
+NUM_CORNERS = 8  # of such a cube
+
 
 class Surface(NamedTuple):
     """Vertices with one set of joints.
@@ -33,6 +35,13 @@ class Surface(NamedTuple):
     owner: int
     rest_weights: Floats
 
+    @property
+    def is_rigid(self) -> bool:
+        """Return whether all points follow the same joint, with weight 1."""
+        return (
+            len(self.nodes) == 1 == self.weights.shape[1] and len(self.points) > 0 and bool((self.weights == 1).all())
+        )
+
 
 def has_vertices(scene: Scene) -> bool:
     """Return whether any mesh of the scene has a vertex."""
@@ -48,6 +57,16 @@ def surfaces(scene: Scene) -> list[Surface]:
     """Return one surface per mesh instance; without any vertex, one per node."""
     found = [_of_instance(scene, instance) for instance in scene.instances if len(instance.mesh.positions)]
     return found or list(_of_nodes(scene))
+
+
+def node_cubes(scene: Scene, diagonal: float) -> Floats:
+    """Return the corners (N, 8, 3) of the cubes around all nodes of a scene without vertices, in the nodes' spaces.
+
+    diagonal: m, of the scene. All are the same: a view of one cube.
+    """
+    sides = (-1.0, 1.0)
+    cube = SHELL * diagonal * np.array([[x, y, z] for x in sides for y in sides for z in sides])
+    return np.broadcast_to(cube, (len(scene.skeleton), *cube.shape))
 
 
 def diagonal(scene: Scene) -> float:
@@ -100,11 +119,9 @@ def _of_instance(scene: Scene, instance: MeshInstance) -> Surface:
 
 
 def _of_nodes(scene: Scene) -> Iterator[Surface]:
-    size = SHELL * diagonal(scene)
-    cube = size * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-    _, bind, joints, weights = _rigid(0, len(cube))
-    targets, no_weights = np.empty((0, 8, 3)), np.empty(0)
-    for node in range(len(scene.skeleton)):
+    _, bind, joints, weights = _rigid(0, NUM_CORNERS)
+    targets, no_weights = np.empty((0, NUM_CORNERS, 3)), np.empty(0)
+    for node, cube in enumerate(node_cubes(scene, diagonal(scene))):
         name = scene.skeleton.display_name(node)
         yield Surface(name, np.array([node]), bind, cube, targets, joints, weights, node, no_weights)
 

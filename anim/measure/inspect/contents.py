@@ -39,14 +39,15 @@ def read_contents(document: Document, *, file_bytes: int, broken: BrokenFile | N
     """Return the readable parts. broken: the faults of a file of which the document is only a part."""
     accessors = Accessors(document)
     clips, unread = reader.readable_clips(document, accessors)
-    scene, scene_error = _scene(document, accessors)
+    skeleton = reader.skeleton(document)
+    scene, scene_error = _scene(document, accessors, skeleton)
     lost = broken.lost_clips if broken else frozenset()
     return FileContents(
         document,
         file_bytes,
         accessors,
         {i: clip for i, clip in clips.items() if i not in lost},
-        reader.skeleton(document),
+        skeleton,
         scene,
         scene_error,
         (*broken.faults, *unread) if broken else tuple(unread),
@@ -54,8 +55,8 @@ def read_contents(document: Document, *, file_bytes: int, broken: BrokenFile | N
     )
 
 
-def _scene(document: Document, accessors: Accessors) -> tuple[Scene | None, AnimError | None]:
+def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> tuple[Scene | None, AnimError | None]:
     try:
-        return reader.scene(document, accessors), None
+        return reader.scene(document, accessors, skeleton), None
     except AnimError as error:
         return None, error

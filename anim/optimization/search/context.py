@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.measure.error import point_matrix as points_
 from anim.measure.error.point_matrix import PointMatrix
+from anim.maths import hierarchy
 from anim.measure.error.shell_points import nodes_without_vertices
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton, Track, parse_weight_pointer
@@ -117,6 +118,4 @@ def _moving_nodes(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:
         for track in clip.tracks:
             if track.node is not None and track.path != "weights":
                 moved[track.node] = True
-    for level in skeleton.levels()[1:]:
-        moved[level] |= moved[skeleton.parents[level]]
-    return moved
+    return hierarchy.with_descendants(skeleton.parents, moved)

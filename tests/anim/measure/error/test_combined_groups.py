@@ -10,6 +10,7 @@ import pytest
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import MaxDisplacement
 from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.sample_times import dense_times
 from anim.measure.error.shell_points import ShellPoints
@@ -38,7 +39,8 @@ def _changed() -> Clip:
 
 def test_joined_vectors_are_those_of_the_parts() -> None:
     of = _two_meshes()
-    shells = ShellPoints(of.skeleton, np.array([1, 3]), np.array([1, 3]), 0.1)
+    nodes = np.array([1, 3])
+    shells = ShellPoints(nodes, nodes, shell_points(of.skeleton, nodes, 0.1))
     parts: list[PointGroups] = [*map(SkinnedGroups, surfaces(of)), shells]
     (joined,) = combine_groups(parts)
     times = np.linspace(0, 2, 9)
