@@ -40,6 +40,12 @@ def _clip(nodes: list[int], name: str = "a", output: int = 1) -> Json:
     return {"name": name, "samplers": [{"input": 0, "output": output}], "channels": channels}
 
 
+def chain_bare(count: int) -> bytes:
+    """Nodes one below the other without a name or place, the first one animated: as many as fit into a file."""
+    nodes: list[Json] = [{"children": [i + 1]} for i in range(count - 1)]
+    return _file([*nodes, {}], animations=[_clip([0])])
+
+
 def _line(count: int) -> list[Json]:
     nodes: list[Json] = [{"name": f"n{i}", "translation": [0, 1e-3, 0], "children": [i + 1]} for i in range(count)]
     del nodes[-1]["children"]
@@ -242,8 +248,8 @@ def json_curves(count: int) -> bytes:
 GLTF: Mapping[str, Make] = {
     each.__name__: each
     for each in (
-        chain, chain_mesh, chain_open, side, side_meshes, side_moving, skins, joints, clips_equal, clips_different,
-        clips_empty, channels, keys, targets, primitives, lists, names,
+        chain, chain_bare, chain_mesh, chain_open, side, side_meshes, side_moving, skins, joints, clips_equal,
+        clips_different, clips_empty, channels, keys, targets, primitives, lists, names,
     )
 }  # fmt: skip
 PHYSICS: Mapping[str, tuple[str, Make]] = {

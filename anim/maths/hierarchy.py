@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from anim.arrays import Bools, Floats, Ints
 MIN_DEPTH = 256  # levels of a tree that is divided: with fewer a step per level is faster
 MAX_WIDTH = 16  # nodes per level, on average, of such a tree
 
+Number = TypeVar("Number", int, float)
 Compose = Callable[[Floats, Floats], Floats]
 
 
@@ -42,16 +44,21 @@ def find_subtrees(parents: Ints) -> tuple[Ints, Ints]:
     order = _depth_first(parents)
     first = np.empty(len(parents), np.int64)
     first[order] = np.arange(len(order))
-    return first, first + subtree_sums(parents, np.ones(len(parents))).astype(np.int64)
+    return first, first + np.array(_sum_up(order, parents, [1] * len(order)), np.int64)
 
 
 def subtree_sums(parents: Ints, values: Floats) -> Floats:
     """Return the sum (N,) of each node's value and those of all nodes below it. parents: (N,), −1 for roots."""
-    total, above = values.tolist(), parents.tolist()
-    for node in reversed(_depth_first(parents)):
+    return np.array(_sum_up(_depth_first(parents), parents, values.tolist()), np.float64)
+
+
+def _sum_up(order: list[int], parents: Ints, values: list[Number]) -> list[Number]:
+    """The sums of each node's value and those below it. order: all nodes, parents before those below them."""
+    total, above = values.copy(), parents.tolist()
+    for node in reversed(order):
         if above[node] >= 0:
             total[above[node]] += total[node]
-    return np.array(total, np.float64)
+    return total
 
 
 def with_descendants(parents: Ints, chosen: Bools) -> Bools:

@@ -13,6 +13,10 @@ from tests import many
 from tests.cli.conftest import Call
 from tests.cli.test_many import LIMIT, work
 
+CALLS_PER_NODE = [  # once twice as many, with an object per node and step
+    (many.chain_bare, 3000, "resample --fps 5 OUT", 70),
+    (many.chain_bare, 3000, "optimize --jobs 1 OUT", 100),
+]
 CASES = [
     (many.joints, 500, "inspect"),  # ancestors of every joint, twice: 2 GB of sets for 8000
 ]
@@ -25,6 +29,15 @@ def test_work_grows_with_the_count(make: many.Make, count: int, command: str, ca
         (tmp_path / f"{number}.glb").write_bytes(make(number))
         taken.append(work(call, command, tmp_path / f"{number}.glb"))
     assert taken[1] < LIMIT * taken[0]
+
+
+@pytest.mark.parametrize(("make", "count", "line", "limit"), CALLS_PER_NODE, ids=lambda each: str(each).split()[0])
+def test_a_node_takes_few_calls(make: many.Make, count: int, line: str, limit: int, call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.glb"
+    path.write_bytes(make(count))
+    names = {"OUT": tmp_path / "out.glb", "IN": path}
+    command, *options = line.split()
+    assert work(call, command, path, *(names.get(each, each) for each in options)) < limit * count
 
 
 def test_a_deep_chain_of_moving_nodes_is_sampled_and_bounded_once(

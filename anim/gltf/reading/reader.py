@@ -22,6 +22,10 @@ INSTANCING = "EXT_mesh_gpu_instancing"
 def skeleton(document: Document) -> Skeleton:
     """Return all nodes in their rest pose; a `matrix` is decomposed, or kept whole if sheared."""
     _check(document)
+    return _skeleton(document, hierarchy.parents(document.json))
+
+
+def _skeleton(document: Document, parents: Sequence[int]) -> Skeleton:
     nodes = json_array(document.json, "nodes")
     n = len(nodes)
     translation, rotation, scale = np.zeros((n, 3)), np.tile((0.0, 0.0, 0.0, 1.0), (n, 1)), np.ones((n, 3))
@@ -40,7 +44,7 @@ def skeleton(document: Document) -> Skeleton:
             scale[i] = node["scale"]
     return Skeleton(
         tuple(node.get("name", "") for node in nodes),
-        np.array(hierarchy.parents(document.json), np.int64),
+        np.array(parents, np.int64),
         translation,
         rotation,
         scale,
@@ -112,14 +116,15 @@ def scene(
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     nodes = json_array(document.json, "nodes")
     instances = []
-    for number in depth_first(document.json, None if known is None else known.parents.tolist()):
+    parents = hierarchy.parents(document.json) if known is None else known.parents.tolist()
+    for number in depth_first(document.json, parents):
         node = nodes[number]
         if "mesh" not in node:
             continue
         skin = skins[node["skin"]] if "skin" in node else None
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
-    return Scene(known or skeleton(document), tuple(instances))
+    return Scene(_skeleton(document, parents) if known is None else known, tuple(instances))
 
 
 def skins(document: Document) -> tuple[tuple[int, Skin], ...]:

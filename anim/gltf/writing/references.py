@@ -30,11 +30,13 @@ class References(NamedTuple):
     """Indices of accessors and views with references outside the replaced animations.
 
     frozen_buffers: those that unknown extensions refer to directly: their bytes must not move.
+    unknown: all whole numbers in unknown extensions: each may be an index of an accessor or view.
     """
 
     accessors: frozenset[int]
     views: frozenset[int]
     frozen_buffers: frozenset[int]
+    unknown: frozenset[int]
 
 
 def references_outside(json: Json, replaced: Iterable[int]) -> References:
@@ -49,7 +51,7 @@ def references_outside(json: Json, replaced: Iterable[int]) -> References:
     parts = [part for _, part in unknown_extensions(json)]
     unknown = {number for part in parts for number in _whole_numbers(part)}
     frozen = {part["buffer"] for part in _objects(parts) if type(part.get("buffer")) is int}
-    return References(frozenset(accessors | unknown), frozenset(views | unknown), frozenset(frozen))
+    return References(frozenset(accessors | unknown), frozenset(views | unknown), frozenset(frozen), frozenset(unknown))
 
 
 def named_accessors(json: Json, skipped: Collection[int] = ()) -> set[int]:
@@ -113,8 +115,8 @@ def _of_skins(json: Json) -> Iterator[int]:
 
 def _of_instancing(json: Json) -> Iterator[int]:
     for node in json_array(json, "nodes"):
-        instancing = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
-        yield from _whole_numbers(instancing)
+        if "extensions" in node:
+            yield from _whole_numbers(node["extensions"].get("EXT_mesh_gpu_instancing", {}))
 
 
 def _of_draco(json: Json) -> Iterator[int]:

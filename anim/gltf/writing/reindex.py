@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation.buffer_layout import DRACO
-from anim.gltf.writing import references
+from anim.gltf.writing import compaction, references
 from anim.gltf.writing.insertion import empty_views, placeholders
 
 IndexMaps: TypeAlias = list[int]  # new index by old index
@@ -23,7 +23,10 @@ def drop_placeholders(document: Document) -> Document:
     changed indices, nothing is dropped. An unchanged document is returned itself.
     """
     json = document.json
-    named, unknown = references.references_outside(json, ()), references.unknown_indices(json)
+    if not placeholders(json) and not any(map(compaction.is_placeholder, json_array(json, "bufferViews"))):
+        return document
+    named = references.references_outside(json, ())
+    unknown = named.unknown
     holes = placeholders(json) - named.accessors
     views = empty_views(json, named)
     accessor_count, view_count = len(json_array(json, "accessors")), len(json_array(json, "bufferViews"))

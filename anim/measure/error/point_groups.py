@@ -225,4 +225,4 @@ class SkinnedGroups:
 
 def _box(points: Floats) -> Floats:
     """Corners (8, 3) of the box around points (V, 3)."""
-    return np.where(SIDES < 0, points.min(axis=0), points.max(axis=0))
+    return np.asarray(np.where(SIDES < 0, points.min(axis=0), points.max(axis=0)))

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints
 from anim.measure.error.orientation_probes import shell_points as shells_of
@@ -23,6 +24,7 @@ DIRECTIONS = np.vstack((np.eye(3), -np.eye(3)))
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
 DENSE = 4_000_000  # values; a larger matrix is stored as a sparse one
+BLOCK = 500_000  # values per step of a product
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,10 @@ class PointMatrix:
 
     @cached_property
     def _matrix(self) -> Any:
-        """The same in float64, dense or sparse."""
+        """The same in float64: dense, sparse, or of one joint per row."""
         width = self.joints.shape[1]
+        if width == 1 and 16 * len(self) * len(self.nodes) > DENSE:
+            return OneJointRows(self.joints[:, 0], self.factors[:, 0])
         row = np.repeat(np.arange(len(self)), 4 * width)
         column = (4 * self.joints[..., None] + np.arange(4)).reshape(-1)
         shape = (len(self), 4 * len(self.nodes))
@@ -90,6 +94,31 @@ class PointMatrix:
         """Return the positions of the points (P, F, 3), from the world matrices (N, F, 3, 4) of all nodes."""
         places = self._matrix @ stack_points(world, self.nodes)
         return np.swapaxes(places.reshape(len(self), 3, world.shape[1]), 1, 2)
+
+
+class OneJointRows:
+    """A sparse matrix (P, 4 J) with one joint per row, as of many nodes or rigid meshes.
+
+    joints: (P,). factors: (P, 4), as of `PointMatrix`.
+    """
+
+    def __init__(self, joints: Ints, factors: NDArray[Any]) -> None:
+        self._joints, self._factors = joints, factors
+
+    def astype(self, kind: type[np.floating[Any]]) -> OneJointRows:
+        """Return the same in another type."""
+        return OneJointRows(self._joints, self._factors.astype(kind))
+
+    def __matmul__(self, columns: NDArray[Any]) -> NDArray[Any]:
+        """Return the product (P, C) with stacked columns (4 J, C), its terms added in order."""
+        found = np.empty((len(self._joints), columns.shape[1]), columns.dtype)
+        step = max(BLOCK // max(columns.shape[1], 1), 1)
+        for some in (slice(start, start + step) for start in range(0, len(found), step)):
+            first, factors = 4 * self._joints[some], self._factors[some, :, None]
+            np.multiply(factors[:, 0], columns[first], out=found[some])
+            for i in range(1, 4):
+                found[some] += factors[:, i] * columns[first + i]
+        return found
 
 
 class PointRows:
@@ -148,6 +177,9 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
     if not parts:
         return PointMatrix(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
     nodes = np.flatnonzero(np.bincount(np.concatenate([nodes.reshape(-1) for nodes, _ in parts])))
+    if len(parts) == 1:
+        ((own, factors),) = parts
+        return PointMatrix(nodes, np.searchsorted(nodes, own), factors)
     count, width = sum(len(own) for own, _ in parts), max(own.shape[1] for own, _ in parts)
     joints: Ints = np.full((count, width), nodes[0] if len(nodes) else 0, np.int64)
     factors = np.zeros((count, width, 4))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats
+from anim.maths import hierarchy
 from anim.measure.error import point_matrix as points_
 from anim.measure.error.point_matrix import PointMatrix
-from anim.maths import hierarchy
 from anim.measure.error.shell_points import nodes_without_vertices
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton, Track, parse_weight_pointer
@@ -89,7 +89,8 @@ def build_context(
     extra: additional vertices to measure beside the extreme ones, (index of the surface, index of the vertex).
     """
     skeleton = scene.skeleton
-    unseen = nodes_without_vertices(skeleton, surfaces(scene) if has_vertices(scene) else [])
+    found = surfaces(scene) if has_vertices(scene) else []
+    unseen = nodes_without_vertices(skeleton, found)
     shells = set(np.flatnonzero(unseen & _moving_nodes(skeleton, clips)).tolist())
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
@@ -101,7 +102,7 @@ def build_context(
         float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0,
         world,
         points,
-        tuple(surface for surface in surfaces(scene) if len(surface.targets)),
+        tuple(surface for surface in found if len(surface.targets)),
         AnsweringPoints(points, skeleton.parents),
         unseen,
         bounds,

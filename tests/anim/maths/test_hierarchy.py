@@ -80,3 +80,24 @@ def test_a_long_chain_takes_no_table_of_pairs() -> None:
     first, end = hierarchy.find_subtrees(np.arange(count) - 1)
     assert first.tolist() == list(range(count))
     assert (end == count).all()
+
+
+@pytest.mark.parametrize("depth", [1, 5, 300])
+def test_nodes_with_those_below_and_above_them(depth: int) -> None:
+    """Against a walk from each node to its root."""
+    random = np.random.default_rng(depth)
+    order = random.permutation(2 * depth)
+    parents = np.full(2 * depth, -1)
+    for i in range(1, depth):
+        parents[order[i]] = order[i - 1]
+        parents[order[depth + i]] = order[random.integers(0, depth + i)]
+    chosen = random.random(2 * depth) < 2 / depth
+    below, above = chosen.copy(), chosen.copy()
+    for node in range(2 * depth):
+        parent = int(parents[node])
+        while parent >= 0:
+            below[node] |= chosen[parent]
+            above[parent] |= chosen[node]
+            parent = int(parents[parent])
+    assert (hierarchy.with_descendants(parents, chosen) == below).all()
+    assert (hierarchy.with_ancestors(parents, chosen) == above).all()

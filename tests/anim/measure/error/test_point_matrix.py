@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from anim.arrays import Floats
 from anim.measure.error import point_matrix as points_
-from anim.measure.error.point_matrix import CARRIED, PointMatrix, all_points, sample_points, stack_points
+from anim.measure.error.point_matrix import CARRIED, OneJointRows, PointMatrix, all_points, sample_points, stack_points
 from anim.measure.error.surface import surfaces
 from anim.model import MeshInstance, Scene
 from anim.sampling import rest_pose, world_matrices
@@ -145,3 +147,17 @@ def test_distinct_points_are_the_first_of_each_label() -> None:
     chosen = points.distinct(np.array([0, 0, 0, 0, 1]))
     assert chosen.tolist() == [0, 2, 3, 4]
     assert points.take(chosen).joints.tolist() == [[0, 1], [1, 0], [0, 1], [0, 1]]
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_rows_of_one_joint_are_those_of_a_sparse_matrix(kind: type[np.floating[Any]]) -> None:
+    from scipy.sparse import csr_array
+
+    random = np.random.default_rng(0)
+    joints, factors = random.integers(0, 50, 300), random.normal(size=(300, 4))
+    columns = random.normal(size=(200, 6)).astype(kind)
+    place = np.repeat(np.arange(300), 4), (4 * joints[:, None] + np.arange(4)).reshape(-1)
+    sparse = csr_array((factors.reshape(-1), place), shape=(300, 200)).astype(kind)
+    found = OneJointRows(joints, factors).astype(kind) @ columns
+    assert found.dtype == kind
+    assert (found == sparse @ columns).all()
