@@ -17,7 +17,10 @@ from anim.sampling.batch import concatenate
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips."""
     for clip in file.facts.clips:
-        if count := clip.no_effect_tracks - (clip.no_effect_tracks == sum(clip.tracks.values())):  # one stays
+        if not clip.no_effect_tracks:
+            continue
+        stays = clip.no_effect_tracks == sum(clip.tracks.values())  # a clip keeps one track
+        if count := clip.no_effect_tracks - stays:
             yield file.in_clip(clip.index, count)
 
 

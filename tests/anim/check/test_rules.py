@@ -225,3 +225,19 @@ def test_gaps_of_the_size_of_the_model_have_no_exponent() -> None:
     occurrences = [Occurrence("clip 'walk'", "/animations/0", value=1.02)]
     assert loop_seam.problem(occurrences) == "a loop jumps by 100 % of the model's size"
     assert residual_root_motion.problem(occurrences).startswith("the root moves by 100 % ")
+
+
+def test_an_empty_clip_is_an_empty_array_and_has_no_tracks_without_effect() -> None:
+    """The validator reports it too (EMPTY_ENTITY); "-1 tracks equal the rest pose" would be nonsense."""
+    document = edited(put("animations/0", {"name": "none", "channels": [], "samplers": []}))
+    findings = find_all(checked(document))
+    (empty,) = [each for each in findings if each.code == "GA011"]
+    assert (empty.where, empty.pointer) == ("clip 'none'", "/animations/0")
+    assert empty.problem == "1 clip with an empty array of channels or samplers"
+    assert "GA113" not in {each.code for each in findings}
+
+
+def test_a_clip_of_ignored_channels_is_not_empty() -> None:
+    channel = {"sampler": 0, "target": {"path": "rotation"}}
+    findings = find_all(checked(edited(put("animations/0/channels", [channel]))))
+    assert not {"GA011", "GA113"} & {each.code for each in findings}
