@@ -14,6 +14,7 @@ from anim.model import Interpolation, TimeAxis, Track, ValueKind
 from anim.sampling.track import KeyInterval, find_interval, interpolate
 
 MAX_GROUP_KEYS = 4096  # of concatenated tracks: temporary arrays fit into the processor's cache
+MAX_COMPARED_PER_TRACK = 2000  # keys × times; comparing more takes longer than a search in each track
 
 Rule: TypeAlias = tuple[str, Interpolation, ValueKind, int]
 Tangents: TypeAlias = tuple[Floats, Floats]
@@ -188,16 +189,23 @@ class ConcatenatedTracks(TrackGroup):
         return interpolate(self._located(at), self.values, self.tangents, self.interpolation, self.kind)
 
     def _located(self, at: Floats) -> KeyInterval:
-        """Key intervals of the times, as by `find_interval`, by counting keys at or before each time."""
-        before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
+        """Key intervals of the times, as by `find_interval`."""
         last = self.counts[:, None] - 1
-        in_track = np.clip(np.add.reduceat(before, self.starts, axis=0, dtype=np.int64) - 1, 0, last)
+        in_track = np.clip(self._count_keys(at) - 1, 0, last)
         left = self.starts[:, None] + in_track
         right = self.starts[:, None] + np.minimum(in_track + 1, last)
         duration = self.times[right] - self.times[left]
         inside = (at > self.times[left]) & (duration > 0)
         u = np.where(inside, (at - self.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
         return KeyInterval(left, right, u, duration)
+
+    def _count_keys(self, at: Floats) -> Ints:
+        """Number of keys (T, F) of each track at or before its times `at` (T, F)."""
+        if len(self.times) * at.shape[1] > MAX_COMPARED_PER_TRACK * len(self.tracks):
+            found = [track.times.searchsorted(each, "right") for track, each in zip(self.tracks, at, strict=True)]
+            return np.array(found, np.int64)
+        before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
+        return np.asarray(np.add.reduceat(before, self.starts, axis=0, dtype=np.int64))
 
 
 def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -30,6 +32,29 @@ def test_each_track_is_sampled_at_its_own_times_as_it_is_alone(limit: int, monke
             np.testing.assert_allclose(values[i], sample(ALL[number], at[number]), rtol=0, atol=1e-15)
             seen.append(number)
     assert sorted(seen) == list(range(len(ALL)))
+
+
+def test_keys_are_searched_as_they_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compared with every time, a million keys and 600 times would take 5 GB."""
+    rng = np.random.default_rng(4)
+    at = np.column_stack((rng.uniform(-1, 4, (len(ALL), 50)), np.full(len(ALL), 1.25)))
+    compared = [group.sample(at[group.numbers]) for group in concatenate(ALL)]
+    monkeypatch.setattr(module, "MAX_COMPARED_PER_TRACK", 0)
+    searched = [group.sample(at[group.numbers]) for group in concatenate(ALL)]
+    assert [each.tobytes() for each in searched] == [each.tobytes() for each in compared]
+
+
+def test_times_in_a_long_track_take_little_memory() -> None:
+    times = np.arange(100_000.0)
+    (group,) = concatenate([clips.track("translation", times, np.stack((times,) * 3, axis=1))])
+    tracemalloc.start()
+    try:
+        values = group.sample(np.linspace(0, 1e5 - 1, 600)[None])
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_allclose(values[0, :, 0], np.linspace(0, 1e5 - 1, 600))
+    assert peak < 10e6  # not keys × times
 
 
 def test_tracks_lie_one_after_the_other_with_their_tangents() -> None:
