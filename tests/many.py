@@ -94,6 +94,17 @@ def skins(count: int) -> bytes:
     return _file(nodes, animations=[_clip([1])], **parts)
 
 
+def skins_different(count: int) -> bytes:
+    """The same, each with an inverse bind matrix of its own."""
+    matrices = np.tile(np.eye(4).ravel(), (count, 2, 1))
+    matrices[:, 1, 13] = -np.linspace(0.1, 0.2, count)  # translation along y
+    more = [("MAT4", 5126, each) for each in matrices]
+    document = json.loads(skins(count)[20:])
+    document |= buffered(TIMES, ROTATIONS, CORNERS, MATRICES, JOINTS, WEIGHTS, *more)
+    document["skins"] = [{"joints": [0, 1], "inverseBindMatrices": 6 + i} for i in range(count)]
+    return glb(json.dumps(document).encode())
+
+
 def joints(count: int) -> bytes:
     """One skin of many joints in one line, the first one animated."""
     nodes = [*_line(count), {"name": "m", "mesh": 0, "skin": 0}]

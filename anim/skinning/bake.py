@@ -154,12 +154,13 @@ class Baker:
 
 def bakeable_instances(scene: Scene, *, rigid: bool = False, nodes: Sequence[int] | None = None) -> list[MeshInstance]:
     """Return the mesh instances with vertices to bake: skinned or morphed ones, all with `rigid`."""
+    chosen = None if nodes is None else frozenset(nodes)
     return [
         instance
         for instance in scene.instances
         if len(instance.mesh.positions)
         and (rigid or instance.skin is not None or len(instance.mesh.targets))
-        and (nodes is None or instance.node in nodes)
+        and (chosen is None or instance.node in chosen)
     ]
 
 

@@ -22,6 +22,8 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
+from anim.sampling.pose import PoseSampler
+from anim.skinning.analysis import collapse as collapse_analysis
 from cli.workflows import mesh_pairs
 from fixtures.broken.pieces import buffered, text
 from tests import many
@@ -263,3 +265,27 @@ def test_meshes_of_two_files_are_paired_by_tables(call: Call, tmp_path: Path, mo
     counted = _count_calls(monkeypatch, mesh_pairs, "node_name")
     call("diff", tmp_path / "in.glb", tmp_path / "in.glb").product()
     assert 0 < len(counted) <= 4 * 100
+
+
+def test_equal_skinned_meshes_are_compared_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "in.glb").write_bytes(many.skins(3))
+    counted = _count_calls(monkeypatch, collapse_analysis, "bind_measures")
+    report = call("collapse", tmp_path / "in.glb", "--format", "json").json
+    assert len(counted) == 1
+    meshes = report["clips"][0]["meshes"]
+    assert (report["skinned_meshes"], [each["mesh"] for each in meshes]) == (3, ["m0", "m1", "m2"])
+    assert all({**each, "mesh": "", "node": 0} == {**meshes[0], "mesh": "", "node": 0} for each in meshes)
+
+
+def test_skinned_meshes_share_the_poses_of_the_skeleton(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All nodes are posed once per frame, whatever the number of meshes."""
+    sizes = []
+    for count in (2, 6):
+        (tmp_path / "in.glb").write_bytes(many.skins_different(count))
+        counted = _count_calls(monkeypatch, PoseSampler, "at_each")
+        call("collapse", tmp_path / "in.glb").product()
+        sizes.append(len(counted))
+        monkeypatch.undo()
+    assert sizes[0] == sizes[1] > 0

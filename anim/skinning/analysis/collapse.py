@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import NotFoundError, RangeError
-from anim.model import Clip, Scene
-from anim.skinning.analysis.collapse_index import CollapsePoint, collapse_indices
-from anim.skinning.analysis.method_scores import MethodScore, bind_measures, score_method
+from anim.model import Clip, MeshInstance, Scene
+from anim.sampling.pose import PosedSkeleton
+from anim.skinning.analysis.collapse_index import CollapseIndices, CollapsePoint, collapse_indices
+from anim.skinning.analysis.equal_meshes import first_equal_mesh
+from anim.skinning.analysis.method_scores import BindMeasures, MethodScore, bind_measures, score_method
 from anim.skinning.bake import prepare_bake
 
 LOW_INDEX = 0.7  # collapse index below which skin looks pinched: that of 90° between two joints
@@ -68,19 +72,25 @@ class Comparison:
         bulge_clamp: bool = False,
         nodes: Sequence[int] | None = None,
     ) -> None:
-        skinned = [i.node for i in scene.instances if i.skin is not None and (nodes is None or i.node in nodes)]
+        skinned = [i for i in scene.instances if i.skin is not None and (nodes is None or i.node in nodes)]
         if not skinned:
             raise NotFoundError("there is no skinned mesh to look at")
         if bulge_clamp and set(methods) == {"lbs"}:
             raise RangeError("`bulge_clamp` requires a method other than lbs (expected dqs or cor)")
         self._scene = scene
+        rest = PosedSkeleton.at_rest(scene.skeleton)
+        self._instances = [each for each in skinned if len(each.mesh.positions)]
+        first = first_equal_mesh(self._instances, rest)
+        distinct = sorted(set(first))
+        self._subject_of = np.searchsorted(distinct, first).tolist()
+        looked_at = [self._instances[i].node for i in distinct]  # equal meshes are compared once
         self._bakers = {
-            method: prepare_bake(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=skinned)
+            method: prepare_bake(scene, method=method, bulge_clamp=bulge_clamp and method != "lbs", nodes=looked_at)
             for method in methods
         }
-        self._linear = self._bakers.get("lbs") or prepare_bake(scene, nodes=skinned)
-        self._subjects = [bind_measures(layer, scene.skeleton) for layer in next(iter(self._bakers.values())).layers]
-        self.meshes = len(self._subjects)
+        self._linear = self._bakers.get("lbs") or prepare_bake(scene, nodes=looked_at)
+        self._subjects = [bind_measures(layer, rest) for layer in next(iter(self._bakers.values())).layers]
+        self.meshes = len(self._instances)
 
     def of(
         self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda methods: None
@@ -90,22 +100,32 @@ class Comparison:
         for i, (method, made) in enumerate(self._bakers.items()):
             by_method.append(list(score_method(made, self._linear, method, self._subjects, clip, times)))
             progress(i + 1)
-        found = []
-        for each, methods in zip(self._subjects, zip(*by_method, strict=True), strict=True):
-            instance, rig = each.layer.instance, each.layer.rig
-            seen = collapse_indices(self._scene, each.layer, clip, times)
-            found.append(
-                MeshCollapse(
-                    instance.mesh.name or self._scene.skeleton.display_name(instance.node),
-                    instance.node,
-                    len(rig.points),
-                    times,
-                    seen.by_frame,
-                    seen.worst,
-                    float((seen.least < LOW_INDEX).mean()),
-                    float(seen.inverted.mean()),
-                    len(each.faces) / max(len(rig.faces), 1),
-                    methods,
-                )
-            )
-        return tuple(found)
+        indices = collapse_indices(self._scene.skeleton, [each.layer for each in self._subjects], clip, times)
+        found = [
+            self._mesh_collapse(each, seen, methods, times)
+            for each, seen, methods in zip(self._subjects, indices, zip(*by_method, strict=True), strict=True)
+        ]
+        return tuple(
+            replace(found[i], mesh=self._name(instance), node=instance.node)
+            for instance, i in zip(self._instances, self._subject_of, strict=True)
+        )
+
+    def _mesh_collapse(
+        self, subject: BindMeasures, seen: CollapseIndices, methods: tuple[MethodScore, ...], times: Floats
+    ) -> MeshCollapse:
+        instance, rig = subject.layer.instance, subject.layer.rig
+        return MeshCollapse(
+            self._name(instance),
+            instance.node,
+            len(rig.points),
+            times,
+            seen.by_frame,
+            seen.worst,
+            float((seen.least < LOW_INDEX).mean()),
+            float(seen.inverted.mean()),
+            len(subject.faces) / max(len(rig.faces), 1),
+            methods,
+        )
+
+    def _name(self, instance: MeshInstance) -> str:
+        return instance.mesh.name or self._scene.skeleton.display_name(instance.node)

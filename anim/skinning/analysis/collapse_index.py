@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
-from anim.model import Clip, Scene, Skeleton
+from anim.model import Clip, Skeleton
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh
@@ -51,40 +52,74 @@ class CollapseIndices:
     worst: CollapsePoint
 
 
-def collapse_indices(scene: Scene, layer: BoundMesh, clip: Clip, times: Floats) -> CollapseIndices:
-    """Return the collapse indices of a skinned mesh at `times` (F,) s of a clip.
+def collapse_indices(
+    skeleton: Skeleton, layers: Sequence[BoundMesh], clip: Clip, times: Floats
+) -> list[CollapseIndices]:
+    """Return the collapse indices of each skinned mesh at `times` (F,) s of a clip.
 
     √D with D = ±det(Σ w A) / Π |det A|^w, A the linear parts of the joints' matrices and w the skin weights: scales
     are divided out, and so is the mirroring of a vertex all of whose joints are mirrored at rest (the minus). Joints
     of scale 0 don't count as collapse.
     """
-    from anim.skinning.kernels.volume_ratio import volume_ratio
-
-    rig = layer.rig
-    sampler = PoseSampler(scene.skeleton, clip)
-    influences, sides = (
-        group_influences(rig.influences),
-        _mirror_signs(rig, layer.matrices(PosedSkeleton.at_rest(scene.skeleton), slice(None))[0]),
-    )
-    least = np.full(len(rig.points), np.inf, np.float32)
-    when = np.zeros(len(rig.points), np.int64)
-    by_frame = np.zeros(len(times))
+    sampler = PoseSampler(skeleton, clip)
+    rest = PosedSkeleton.at_rest(skeleton)
+    found = [_LowestFactors(layer, rest, len(times)) for layer in layers]
     for first in range(0, len(times), LANES):
-        matrices = layer.matrices(sampler.posed(times[first : first + LANES]), slice(None))
-        factors: FloatArray = np.empty((len(rig.points), len(matrices)), np.float32)
-        volume_ratio(influences, lanes(matrices), _log_volumes(matrices), factors)
-        factors *= sides[:, None]
-        factors[~np.isfinite(factors) | (np.diff(rig.start) == 0)[:, None]] = 1
-        by_frame[first : first + LANES] = factors.min(axis=0, initial=1)
+        frames = sampler.posed(times[first : first + LANES])  # once for all meshes
+        for each in found:
+            each.add(frames, first)
+    return _with_points(skeleton, found, sampler, times)
+
+
+class _LowestFactors:
+    """Smallest volume factors of one mesh over the frames so far.
+
+    least, when: (V,) of each vertex, and its frame. by_frame: (F,) of the worst vertex.
+    """
+
+    def __init__(self, layer: BoundMesh, rest: PosedSkeleton, frames: int) -> None:
+        rig = layer.rig
+        self.layer = layer
+        self._influences = group_influences(rig.influences)
+        self._sides = _mirror_signs(rig, layer.matrices(rest, slice(None))[0])
+        self._unbound = (np.diff(rig.start) == 0)[:, None]
+        self.least = np.full(len(rig.points), np.inf, np.float32)
+        self.when = np.zeros(len(rig.points), np.int64)
+        self.by_frame = np.zeros(frames)
+
+    def add(self, frames: PosedSkeleton, first: int) -> None:
+        """Add at most LANES frames from index `first` on."""
+        from anim.skinning.kernels.volume_ratio import volume_ratio
+
+        matrices = self.layer.matrices(frames, slice(None))
+        factors: FloatArray = np.empty((len(self.least), len(matrices)), np.float32)
+        volume_ratio(self._influences, lanes(matrices), _log_volumes(matrices), factors)
+        factors *= self._sides[:, None]
+        factors[~np.isfinite(factors) | self._unbound] = 1
+        self.by_frame[first : first + LANES] = factors.min(axis=0, initial=1)
         at = factors.argmin(axis=1)
         lowest = np.take_along_axis(factors, at[:, None], 1)[:, 0]
-        when[lowest < least] = first + at[lowest < least]
-        least = np.minimum(least, lowest)
-    root = np.sqrt(np.clip(least.astype(np.float64), 0, None))
-    worst = int(least.argmin())
-    time = float(times[when[worst]])
-    narrow = _collapse_point(scene.skeleton, layer, sampler, worst, time, float(root[worst]))
-    return CollapseIndices(root, np.sqrt(np.clip(by_frame, 0, None)), least < 0, narrow)
+        self.when[lowest < self.least] = first + at[lowest < self.least]
+        self.least = np.minimum(self.least, lowest)
+
+
+def _with_points(
+    skeleton: Skeleton, found: Sequence[_LowestFactors], sampler: PoseSampler, times: Floats
+) -> list[CollapseIndices]:
+    """The results, each with its worst vertex: the meshes that are worst at one time share its pose."""
+    worst = [int(each.least.argmin()) for each in found]
+    frame = [int(each.when[vertex]) for each, vertex in zip(found, worst, strict=True)]
+    result: dict[int, CollapseIndices] = {}
+    posed, posed_frame = None, -1
+    for i in sorted(range(len(found)), key=frame.__getitem__):
+        each, time = found[i], float(times[frame[i]])
+        if posed is None or frame[i] != posed_frame:
+            posed, posed_frame = sampler.posed(np.array([time])), frame[i]
+        root = np.sqrt(np.clip(each.least.astype(np.float64), 0, None))
+        point = _collapse_point(skeleton, each.layer, posed, worst[i], time, float(root[worst[i]]))
+        by_frame = np.sqrt(np.clip(each.by_frame, 0, None))
+        result[i] = CollapseIndices(root, by_frame, each.least < 0, point)
+    return [result[i] for i in range(len(found))]
 
 
 def _mirror_signs(rig: SkinBinding, still: Floats) -> FloatArray:
@@ -102,14 +137,14 @@ def _log_volumes(matrices: Floats) -> FloatArray:
 
 
 def _collapse_point(
-    names: Skeleton, layer: BoundMesh, sampler: PoseSampler, vertex: int, time: float, index: float
+    names: Skeleton, layer: BoundMesh, frames: PosedSkeleton, vertex: int, time: float, index: float
 ) -> CollapsePoint:
     rig = layer.rig
     influences = rig.joint[rig.start[vertex] : rig.start[vertex + 1]].tolist()
     if not influences:
         return CollapsePoint(index, vertex, "", "", time, 0.0, False)
     a, b = influences[0], influences[1] if len(influences) > 1 else influences[0]
-    matrices = layer.matrices(sampler.posed(np.array([time])), slice(None))
+    matrices = layer.matrices(frames, slice(None))
     places = joint_origins(rig)[[a, b]]
     first, second = decompose(matrices[:, [a, b]], places).rotation[0]
     turn = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(first), second))

@@ -60,12 +60,12 @@ class BindMeasures:
     watched: Ints
 
 
-def bind_measures(layer: BoundMesh, skeleton: Skeleton) -> BindMeasures:
-    """Return the measures of a mesh in bind pose under a skeleton."""
+def bind_measures(layer: BoundMesh, rest: PosedSkeleton) -> BindMeasures:
+    """Return the measures of a mesh in bind pose. rest: its skeleton in the rest pose."""
     rig = layer.rig
     faces = rig.faces[watertight_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
-    volume *= np.sign(_common_volume(rig, layer.matrices(PosedSkeleton.at_rest(skeleton), slice(None)))[0])
+    volume *= np.sign(_common_volume(rig, layer.matrices(rest, slice(None)))[0])
     of = bone_segments(rig)
     shared = of.fraction > 0
     middle = float(np.median(of.distance[shared])) if shared.any() else 0.0
