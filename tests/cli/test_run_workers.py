@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.workflows.run.job import Job, JobResult
+from cli.workflows.run.job import Job, JobResult, shorten
 from cli.workflows.run.workers import local_pool, run_jobs
 from tests.cli.conftest import Call
 from tests.cli.running import ENVIRONMENT, started
@@ -149,3 +150,11 @@ def test_jobs_in_one_process_and_in_several_make_the_same(crowd: Path, call: Cal
     alone = (crowd / "build/crowd/03.glb").read_bytes()
     begin(crowd, "--no-cache", "-q").communicate(timeout=MAX_WAIT_S)
     assert (crowd / "build/crowd/03.glb").read_bytes() == alone
+
+
+def test_many_messages_fit_in_the_buffer_of_a_pipe() -> None:
+    lines = [f"{i}: {'x' * 290}" for i in range(1000)]
+    found = shorten(lines)
+    assert (found[0], found[80], found[-1]) == (lines[0], "… 900 more lines", lines[-1])
+    assert len(pickle.dumps(JobResult(0, found))) < 1 << 16
+    assert shorten(lines[:100]) == tuple(lines[:100])

@@ -27,6 +27,7 @@ from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 from cli.workflows.run.steps import Step
 
 EMPTY: Bytes = np.empty(0, np.uint8)
+MAX_FIRST_MESSAGES, MAX_LAST_MESSAGES = 80, 20  # lines of at most 300 characters
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,18 @@ def run_job(job: Job) -> JobResult:
     with use_streams(streams):
         code = errors.run_guarded(work)
     seconds = time.perf_counter() - began
-    return JobResult(code, tuple(streams.messages), size, stamp, seconds, input_size(job), others)
+    return JobResult(code, shorten(streams.messages), size, stamp, seconds, input_size(job), others)
+
+
+def shorten(messages: Sequence[str]) -> tuple[str, ...]:
+    """Return the first and last of many messages: errors are the last.
+
+    Results fit in the buffer of a pipe, so that a worker which is killed leaves none that is half written.
+    """
+    if len(messages) <= MAX_FIRST_MESSAGES + MAX_LAST_MESSAGES:
+        return tuple(messages)
+    left = len(messages) - MAX_FIRST_MESSAGES - MAX_LAST_MESSAGES
+    return (*messages[:MAX_FIRST_MESSAGES], f"… {left} more lines", *messages[-MAX_LAST_MESSAGES:])
 
 
 def _check_version(version: str) -> None:
