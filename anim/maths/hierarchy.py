@@ -20,14 +20,19 @@ Number = TypeVar("Number", int, float)
 Compose = Callable[[Floats, Floats], Floats]
 
 
-def accumulate(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose) -> Floats:
+def accumulate(
+    local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose, *, out: Floats | None = None
+) -> Floats:
     """Return the products (N, ...) of the values on the path from the root to each node.
 
     local: (N, ...). parents: (N,), −1 for roots. levels: node indices by depth, roots first. compose: associative,
-    of the parents' products (M, ...) and the nodes' own values (M, ...).
+    of the parents' products (M, ...) and the nodes' own values (M, ...). out: array for the result, which may be
+    `local` itself.
     accumulate([2, 3, 5], [-1, 0, 1], [[0], [1], [2]], np.multiply) → [2, 6, 30]
     """
-    return (_by_section if is_deep(levels) else _by_level)(local, parents, levels, compose)
+    found = np.empty(local.shape) if out is None else out
+    (_by_section if is_deep(levels) else _by_level)(local, parents, levels, compose, found)
+    return found
 
 
 def is_deep(levels: Sequence[Ints]) -> bool:
@@ -85,19 +90,21 @@ def with_ancestors(parents: Ints, chosen: Bools) -> Bools:
     return found
 
 
-def _by_level(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose) -> Floats:
-    found = np.empty(local.shape)
+def _by_level(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose, found: Floats) -> None:
     for depth, nodes in enumerate(levels):
         at = _index(nodes)
-        found[at] = compose(found[_index(parents[nodes])], local[at]) if depth else local[at]
-    return found
+        if depth:
+            found[at] = compose(found[_index(parents[nodes])], local[at])
+        elif found is not local:
+            found[at] = local[at]
 
 
-def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose) -> Floats:
+def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose, found: Floats) -> None:
     """Products of D levels in 2 √D steps: first in all sections of √D levels at once, then of one after the other."""
     height = math.isqrt(len(levels))
     sections = [levels[i : i + height] for i in range(0, len(levels), height)]
-    found = local.copy()
+    if found is not local:
+        found[:] = local
     above = parents.copy()  # of each node: the parent of its section's first node above it
     for step in range(1, height):
         nodes = np.concatenate([section[step] for section in sections if step < len(section)])
@@ -106,7 +113,6 @@ def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: C
     for section in sections[1:]:
         nodes = np.concatenate(section)
         found[nodes] = compose(found[above[nodes]], found[nodes])
-    return found
 
 
 def _index(nodes: Ints) -> Ints | slice:

@@ -6,6 +6,8 @@ makes sums and products twice as fast.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from anim.arrays import Floats, Ints
@@ -13,17 +15,30 @@ from anim.maths import hierarchy, quaternion
 
 MIN_AXIS_RATIO = 0.01  # of the longest axis; in float32, directions of shorter axes are dominated by rounding
 ORTHOGONALITY_TOLERANCE = 1e-9  # cosine between axes that counts as 0
+BLOCK = 65_536  # matrices composed at once, each of about 300 bytes with what comes between
 
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
     """Return T·R·S (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4), scale (..., 3)."""
+    result = _by_component(rotation.shape[:-1])
+    count = math.prod(rotation.shape[:-1])
+    if count <= BLOCK:
+        _compose_trs(translation, rotation, scale, result)
+        return result
+    step = max(len(rotation) * BLOCK // count, 1)
+    for some in (slice(start, start + step) for start in range(0, len(rotation), step)):
+        _compose_trs(translation[some], rotation[some], scale[some], result[some])
+    return result
+
+
+def _compose_trs(translation: Floats, rotation: Floats, scale: Floats, result: Floats) -> None:
+    """Write T·R·S into `result` (..., 3, 4)."""
     x, y, z, w = np.ascontiguousarray(np.moveaxis(rotation, -1, 0))
     sx, sy, sz = np.ascontiguousarray(np.moveaxis(scale, -1, 0))
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz = x * x2, y * y2, z * z2
     xy, xz, yz = x * y2, x * z2, y * z2
     wx, wy, wz = w * x2, w * y2, w * z2
-    result = _by_component(rotation.shape[:-1])
     np.multiply(1 - (yy + zz), sx, out=result[..., 0, 0])
     np.multiply(xy - wz, sy, out=result[..., 0, 1])
     np.multiply(xz + wy, sz, out=result[..., 0, 2])
@@ -34,7 +49,6 @@ def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
     np.multiply(yz + wx, sy, out=result[..., 2, 1])
     np.multiply(1 - (xx + yy), sz, out=result[..., 2, 2])
     result[..., 3] = translation
-    return result
 
 
 def multiply(a: Floats, b: Floats) -> Floats:
@@ -90,13 +104,14 @@ def decompose(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return matrix[..., 3].copy(), quaternion.from_matrix(np.swapaxes(directions, -1, -2)), scale, shear
 
 
-def accumulate_world(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
+def accumulate_world(local: Floats, parents: Ints, levels: list[Ints], *, in_place: bool = False) -> Floats:
     """Return world matrices (N, F, 3, 4) from local ones: one batched product per level of the hierarchy, or fewer.
 
-    parents: (N,), −1 for roots. levels: node indices by depth, roots first.
+    parents: (N,), −1 for roots. levels: node indices by depth, roots first. in_place: whether they replace the local
+    ones.
     """
     columns = np.swapaxes(local, 1, 3)
-    world = hierarchy.accumulate(columns, parents, levels, _multiply_columns)
+    world = hierarchy.accumulate(columns, parents, levels, _multiply_columns, out=columns if in_place else None)
     return np.swapaxes(world, 1, 3)
 
 

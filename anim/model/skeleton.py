@@ -12,6 +12,7 @@ import numpy as np
 from anim import arrays
 from anim.arrays import Bools, Floats, Ints
 from anim.errors import FormatError, ShapeError
+from anim.maths import hierarchy
 from anim.model.morphed_node import MorphedNode
 
 
@@ -79,9 +80,7 @@ class Skeleton:
         """Return a mask (N,) of `node` and its descendants."""
         found = np.zeros(len(self.parents), np.bool_)
         found[node] = True
-        for level in self.levels()[1:]:
-            found[level] |= found[self.parents[level]]
-        return found
+        return hierarchy.with_descendants(self.parents, found)
 
     def derive(self, compute: Callable[[Skeleton], Floats]) -> Floats:
         """Return the array that a function computes from this skeleton, read-only: computed once, kept here."""

@@ -18,7 +18,12 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
 def world_by_node(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return world_from_node (N, F, 3, 4), in the memory order of the computation."""
-    return matrix.accumulate_world(local_by_node(skeleton, pose), skeleton.parents, skeleton.levels())
+    return accumulate(skeleton, local_by_node(skeleton, pose))
+
+
+def accumulate(skeleton: Skeleton, local: Floats) -> Floats:
+    """Return world_from_node (N, F, 3, 4) in place of parent_from_node (N, F, 3, 4)."""
+    return matrix.accumulate_world(local, skeleton.parents, skeleton.levels(), in_place=True)
 
 
 def world_rotations(skeleton: Skeleton, local: Floats) -> dict[int, Floats]:

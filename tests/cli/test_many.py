@@ -240,9 +240,9 @@ def test_static_nodes_are_measured_as_one(call: Call, tmp_path: Path, monkeypatc
     """Of 3000 nodes one moves: world matrices are those of a few nodes, in every frame."""
     sizes: list[int] = []
 
-    def called(local: Floats, parents: Ints, *more: Any) -> Floats:
+    def called(local: Floats, parents: Ints, *more: Any, **options: Any) -> Floats:
         sizes.append(local.size // 12)
-        return accumulate(local, parents, *more)
+        return accumulate(local, parents, *more, **options)
 
     accumulate = hierarchy.accumulate
     monkeypatch.setattr(hierarchy, "accumulate", called)

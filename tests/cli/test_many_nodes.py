@@ -16,6 +16,10 @@ from tests.cli.test_many import LIMIT, work
 CALLS_PER_NODE = [  # once twice as many, with an object per node and step
     (many.chain_bare, 3000, "resample --fps 5 OUT", 70),
     (many.chain_bare, 3000, "optimize --jobs 1 OUT", 100),
+    (many.chain_bare, 3000, "inspect", 80),
+    (many.chain_bare, 3000, "check", 85),
+    (many.chain_bare, 3000, "diff IN", 170),
+    (many.chain_bare, 3000, "loop OUT --blend 0.1", 100),
 ]
 CASES = [
     (many.joints, 500, "inspect"),  # ancestors of every joint, twice: 2 GB of sets for 8000

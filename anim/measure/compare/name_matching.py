@@ -21,7 +21,9 @@ def match_by_name(old: Sequence[str], new: Sequence[str]) -> Ints:
     for i, name in enumerate(new):
         waiting[name].append(i)
     waiting[""].clear()
-    return np.array([waiting[name].pop(0) if waiting.get(name) else -1 for name in old], np.int64)
+    for each in waiting.values():
+        each.reverse()
+    return np.array([waiting[name].pop() if waiting.get(name) else -1 for name in old], np.int64)
 
 
 def match_by_letters(old: Sequence[str], new: Sequence[str]) -> Ints:

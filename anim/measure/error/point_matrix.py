@@ -6,7 +6,7 @@ per node (x, y, z and 1 of w·b·p), the displacements of all vertices at all ti
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,7 @@ CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in
 ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
 DENSE = 4_000_000  # values; a larger matrix is stored as a sparse one
 BLOCK = 500_000  # values per step of a product
+NODE_BLOCK = 8192  # nodes whose matrices are stacked at once
 
 
 @dataclass(frozen=True)
@@ -111,13 +112,19 @@ class OneJointRows:
 
     def __matmul__(self, columns: NDArray[Any]) -> NDArray[Any]:
         """Return the product (P, C) with stacked columns (4 J, C), its terms added in order."""
-        found = np.empty((len(self._joints), columns.shape[1]), columns.dtype)
-        step = max(BLOCK // max(columns.shape[1], 1), 1)
-        for some in (slice(start, start + step) for start in range(0, len(found), step)):
-            first, factors = 4 * self._joints[some], self._factors[some, :, None]
-            np.multiply(factors[:, 0], columns[first], out=found[some])
-            for i in range(1, 4):
-                found[some] += factors[:, i] * columns[first + i]
+        return np.concatenate([part._product(columns) for part in self.split(columns.shape[1])])
+
+    def split(self, count: int) -> list[OneJointRows]:
+        """Return the rows in blocks whose products with `count` columns take little memory."""
+        step = max(BLOCK // max(count, 1), 1)
+        starts = range(0, max(len(self._joints), 1), step)
+        return [OneJointRows(self._joints[i : i + step], self._factors[i : i + step]) for i in starts]
+
+    def _product(self, columns: NDArray[Any]) -> NDArray[Any]:
+        first, factors = 4 * self._joints, self._factors[..., None]
+        found: NDArray[Any] = factors[:, 0] * columns[first]
+        for i in range(1, 4):
+            found += factors[:, i] * columns[first + i]
         return found
 
 
@@ -127,16 +134,37 @@ class PointRows:
     def __init__(self, matrix: Any) -> None:
         self._matrix = matrix
 
-    def moves(self, columns: Floats) -> Floats:
+    def moves(self, columns: NDArray[Any]) -> Floats:
         """Return displacements (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
-        moved = self._matrix @ columns.astype(np.float32)
-        return np.asarray(moved).reshape(len(moved), 3, columns.shape[1] // 3)
+        return _moves(self._matrix, columns.astype(np.float32, copy=False))
+
+    def squares(self, columns: NDArray[Any]) -> Floats:
+        """Return the squared lengths (P, F) of displacements, in float32, of many points in blocks."""
+        parts = self._matrix.split(columns.shape[1]) if isinstance(self._matrix, OneJointRows) else [self._matrix]
+        found = []
+        for part in parts:
+            moves = _moves(part, columns.astype(np.float32, copy=False))
+            moves *= moves
+            found.append(moves.sum(axis=1))
+        return np.concatenate(found)
+
+
+def _moves(matrix: Any, columns: NDArray[np.float32]) -> Floats:
+    moved = np.asarray(matrix @ columns)
+    return moved.reshape(len(moved), 3, columns.shape[1] // 3)
 
 
 def stack_points(world: Floats, nodes: Ints) -> Floats:
     """Return the columns of world matrices (N, F, 3, 4) of `nodes` as (4 J, 3 F): all x, all y, all z."""
     chosen = world[nodes]
     return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), 3 * world.shape[1])
+
+
+def stack_blocks(matrices: Callable[[Ints], Floats], nodes: Ints) -> NDArray[np.float32]:
+    """Return the same in float32, from a function that gives the matrices (J, F, 3, 4) of some nodes, in blocks."""
+    blocks = [nodes[i : i + NODE_BLOCK] for i in range(0, max(len(nodes), 1), NODE_BLOCK)]
+    stacked = (stack_points(matrices(each), np.arange(len(each))).astype(np.float32) for each in blocks)
+    return np.concatenate(list(stacked))
 
 
 def sample_points(

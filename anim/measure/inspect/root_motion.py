@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anim.arrays import Floats
+from anim.maths import hierarchy
 from anim.model import Clip, Skeleton
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import sample_clips
-from anim.sampling.world import world_by_node
+from anim.sampling.pose import sample_world_matrices
 
 MIN_DISPLACEMENT_PER_PATH = 0.7
 
@@ -42,11 +42,17 @@ def root_motions(
     """
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
-    times = np.array([[clip.start, clip.end] for clip in clips])
-    world = world_by_node(skeleton, sample_clips(skeleton, clips, times, groups=groups)[0])
-    places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
     depth = _depths(skeleton)
-    return [_travel(clip, places[:, i, 1] - places[:, i, 0], depth, figure) for i, clip in enumerate(clips)]
+    roots = [_root(clip, depth, figure) if clip.end > clip.start else -1 for clip in clips]
+    if max(roots) < 0:
+        return [RootMotion(-1, 0.0, 0.0) for _ in clips]
+    times = np.array([[clip.start, clip.end] for clip in clips])
+    world, _ = sample_world_matrices(skeleton, clips, times, groups=groups)
+    places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
+    return [
+        _travel(clip, root, places[root, i, 1] - places[root, i, 0])
+        for i, (clip, root) in enumerate(zip(clips, roots, strict=True))
+    ]
 
 
 def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
@@ -65,10 +71,9 @@ def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:
         return frozenset(above)
     scenes = json.get("scenes", ())
     tops = scenes[json.get("scene", 0)].get("nodes", ()) if scenes else ()
-    found = np.zeros(len(skeleton) + 1, bool)  # the last one for roots, whose parent is −1
+    found = np.zeros(len(skeleton), np.bool_)
     found[list(tops)] = True
-    for level in skeleton.levels():
-        found[level] |= found[skeleton.parents[level]]
+    found = hierarchy.with_descendants(skeleton.parents, found)
     return frozenset(np.flatnonzero(found).tolist() or range(len(skeleton)))
 
 
@@ -92,14 +97,12 @@ def _leads(skeleton: Skeleton, clip: Clip, root: int) -> bool:
     return length > 0 and float(np.linalg.norm(path[-1] - path[0])) > MIN_DISPLACEMENT_PER_PATH * length
 
 
-def _travel(clip: Clip, away: Floats, depth: Floats, figure: AbstractSet[int] | None) -> RootMotion:
-    """Root motion of one clip. away: displacement (N, 3) from start to end."""
-    duration = clip.end - clip.start
-    if duration <= 0:
+def _travel(clip: Clip, root: int, away: Floats) -> RootMotion:
+    """Root motion of one clip. away: displacement (3,) of the root from start to end."""
+    if root < 0:
         return RootMotion(-1, 0.0, 0.0)
-    root = _root(clip, depth, figure)
-    distance = float(np.linalg.norm(away[root])) if root >= 0 else 0.0
-    return RootMotion(root, distance, distance / duration)
+    distance = float(np.linalg.norm(away))
+    return RootMotion(root, distance, distance / (clip.end - clip.start))
 
 
 def _root(clip: Clip, depth: Floats, figure: AbstractSet[int] | None = None) -> int:
@@ -112,7 +115,6 @@ def _root(clip: Clip, depth: Floats, figure: AbstractSet[int] | None = None) -> 
 
 
 def _depths(skeleton: Skeleton) -> Floats:
-    depth = np.zeros(len(skeleton))
-    for level, nodes in enumerate(skeleton.levels()):
-        depth[nodes] = level
+    depth, levels = np.zeros(len(skeleton)), skeleton.levels()
+    depth[np.concatenate(levels)] = np.repeat(np.arange(len(levels)), [len(level) for level in levels])
     return depth

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.measure.error.point_matrix import PointMatrix, stack_points
+from anim.maths import hierarchy
+from anim.measure.error.point_matrix import PointMatrix, stack_blocks
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Pose, Skeleton
 from anim.sampling.world import world_by_node
 
 PARTS = ("translation", "rotation", "scale")
 MAX_MATRICES = 250_000  # nodes × changed nodes per block, each about 500 bytes
+
+Differences: TypeAlias = Callable[[Ints], Floats]  # of matrices (J, F, 3, 4) of nodes (J,)
 
 
 def carried_distances(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> Floats:
@@ -33,11 +37,11 @@ def carried_distances(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> F
 
 
 def _squares(
-    skeleton: Skeleton, both: Pose, nodes: Ints, root: int, squares: Callable[[Floats], Floats], count: int
+    skeleton: Skeleton, both: Pose, nodes: Ints, root: int, squares: Callable[[Differences], Floats], count: int
 ) -> Floats:
     """Largest squared distances (K,).
 
-    squares: gives those of all points (P, F) from differences of matrices (N, F, 3, 4), for `count` frames at once.
+    squares: gives those of all points (P, F) from differences of matrices, for `count` frames at once.
     """
     frame = np.arange(len(nodes))
     parts = {name: np.repeat(getattr(both, name)[1:], len(nodes), axis=0) for name in PARTS}
@@ -50,7 +54,7 @@ def _squares(
     changed = Pose(times, parts["translation"], parts["rotation"], parts["scale"])
     differences = np.subtract(*(world_by_node(skeleton, each) for each in (changed, last)))
     stretches = (differences[:, first : first + count] for first in range(0, len(nodes), count))
-    found = [squares(each).max(axis=0, initial=0.0) for each in stretches]
+    found = [squares(each.__getitem__).max(axis=0, initial=0.0) for each in stretches]
     return np.concatenate(found) if found else np.zeros(0)
 
 
@@ -63,9 +67,8 @@ def _squares_of_part(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> Fl
         return np.zeros(len(nodes))
     rows = points.rows()
 
-    def squares(differences: Floats) -> Floats:
-        moves = rows.moves(stack_points(differences, points.nodes))
-        return np.asarray((moves * moves).sum(axis=1))
+    def squares(differences: Differences) -> Floats:
+        return rows.squares(stack_blocks(differences, points.nodes))
 
     part = Pose(both.times, both.translation[:, kept], both.rotation[:, kept], both.scale[:, kept])
     own_root = int(index[root]) if root >= 0 and kept[root] else -1
@@ -74,14 +77,10 @@ def _squares_of_part(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> Fl
 
 def _subtrees(skeleton: Skeleton, nodes: Ints) -> tuple[Bools, Bools]:
     """Masks (N,) of the nodes and their descendants, and of these and their ancestors."""
-    below = np.zeros(len(skeleton), np.bool_)
-    below[nodes] = True
-    for level in skeleton.levels()[1:]:
-        below[level] |= below[skeleton.parents[level]]
-    kept = below.copy()
-    for level in reversed(skeleton.levels()[1:]):
-        kept[skeleton.parents[level[kept[level]]]] = True
-    return below, kept
+    chosen = np.zeros(len(skeleton), np.bool_)
+    chosen[nodes] = True
+    below = hierarchy.with_descendants(skeleton.parents, chosen)
+    return below, hierarchy.with_ancestors(skeleton.parents, below)
 
 
 def _take(skeleton: Skeleton, kept: Bools, index: Ints) -> Skeleton:

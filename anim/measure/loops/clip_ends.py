@@ -11,9 +11,8 @@ from anim.arrays import Floats
 from anim.measure.error import orientation_probes
 from anim.model import Clip, Skeleton
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import sample_clips
+from anim.sampling.pose import sample_world_matrices
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
-from anim.sampling.world import world_by_node
 
 # Rows are differences, columns the times start, just after it, one probe later, one frame later, and the same
 # before the end. Rows: pose; velocity (× probe); first and last frame's motion; start against extrapolated end.
@@ -88,21 +87,20 @@ def poses_around_ends(
     chosen = slice(None) if has_frame else TIMES_WITHOUT_FRAME
     times, held = every[:, chosen], every[:, STEP_TIME_INDEX][:, chosen]
     clips = [part.clip for part in parts]
-    whole, weights = sample_clips(skeleton, clips, times, step_times=held, groups=groups)
-    world = world_by_node(skeleton, whole)
+    world, weights = sample_world_matrices(skeleton, clips, times, step_times=held, groups=groups)
     world = world.reshape(len(skeleton), *times.shape, 3, 4)
     for i, part in enumerate(parts):
         remove_root_motion(skeleton, world[:, i], part.root)
     return [EndPoses(world[:, i], weights[i]) for i in range(len(parts))]
 
 
-def remove_root_motion(skeleton: Skeleton, world: Floats, root: int) -> None:
+def remove_root_motion(skeleton: Skeleton, world: Floats, root: int, origin: Floats | None = None) -> None:
     """Remove the displacement of node `root` since the first frame from world matrices, in place.
 
-    world: (N, F, 3, 4). root: −1 for none.
+    world: (N, F, 3, 4). root: −1 for none. origin: (3,) m, its place in the first frame, if that is not among these.
     """
     if root >= 0:
-        way = world[root, :, :, 3] - world[root, :1, :, 3]
+        way = world[root, :, :, 3] - (world[root, :1, :, 3] if origin is None else origin)
         world[..., 3] -= skeleton.descendants(root)[:, None, None] * way
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.maths import matrix
+from anim.maths import hierarchy, matrix
 from anim.measure.error.surface import Surface
 from anim.measure.loops.carried_distance import carried_distances
 from anim.measure.loops.skin_motion import SkinMotion
@@ -57,9 +57,7 @@ def _carrying(skin: SkinMotion) -> Bools:
     """Mask (N,) of the nodes with points on them or on their descendants."""
     points, carrying = skin.points, np.zeros(len(skin.skeleton), np.bool_)
     carrying[points.nodes[points.joints[points.factors[..., 3] > 0]]] = True
-    for level in reversed(skin.skeleton.levels()[1:]):
-        carrying[skin.skeleton.parents[level[carrying[level]]]] = True
-    return carrying
+    return hierarchy.with_ancestors(skin.skeleton.parents, carrying)
 
 
 def _moved_between(both: Pose, root: int) -> Ints:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.measure.loops.skin_motion import SkinMotion, longest_each, morphed_vertices
@@ -38,21 +38,26 @@ def measure_seams(
     if not parts or not len(skin.vertices):
         return [Seam() for _ in parts]
     has_frame = any(part.frame for part in parts)
-    seen = clip_ends.poses_around_ends(skin.skeleton, parts, groups, has_frame=has_frame)
     wanted = clip_ends.DIFFERENCES if has_frame else clip_ends.WITHOUT_FRAME
-    count = skin.batch_size(len(wanted))
-    return [
-        seam
-        for first in range(0, len(parts), count)
-        for seam in _seams(skin, seen[first : first + count], parts[first : first + count], wanted)
-    ]
+    count, most = skin.batch_size(len(wanted)), skin.posed_at_once(wanted.shape[1])
+    found: list[Seam] = []
+    for start in range(0, len(parts), most):
+        some = parts[start : start + most]
+        own = groups if len(some) == len(parts) else None
+        seen = clip_ends.poses_around_ends(skin.skeleton, some, own, has_frame=has_frame)
+        for first in range(0, len(some), count):
+            found += _seams(skin, seen[first : first + count], some[first : first + count], wanted)
+    return found
 
 
 def _seams(skin: SkinMotion, seen: Sequence[EndPoses], parts: Sequence[LoopRange], wanted: Floats) -> list[Seam]:
     """wanted: (D, T), DIFFERENCES or WITHOUT_FRAME."""
-    worlds = np.stack([each.world for each in seen], axis=1)  # (N, parts, T, 3, 4)
-    differences = clip_ends.differences(worlds, 2, wanted)
-    squares = skin.squares(differences.reshape(len(skin.skeleton), -1, 3, 4)).reshape(len(skin.vertices), len(seen), -1)
+
+    def differences(nodes: Ints) -> Floats:
+        worlds = np.stack([each.world[nodes] for each in seen], axis=1)  # (J, parts, T, 3, 4)
+        return clip_ends.differences(worlds, 2, wanted).reshape(len(nodes), -1, 3, 4)
+
+    squares = skin.squares(differences).reshape(len(skin.vertices), len(seen), -1)
     morphing = [skin.exclude_morphing(squares[:, i], each.weights) for i, each in enumerate(seen)]
     most = np.sqrt(squares.max(axis=0)).astype(np.float64)  # (parts, D): of all ranges at once
     points = squares[..., clip_ends.VELOCITY].argmax(axis=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -15,12 +15,13 @@ from anim.measure.error.surface import Surface, has_vertices, morph_points, skin
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Scene
-from anim.sampling.pose import PosedSkeleton, sample_clips, sample_pose
+from anim.sampling.pose import rest_world, sample_pose, sample_world_matrices
 from anim.sampling.world import world_by_node
 
 MOTION = np.array([-1.0, 1])  # weights of two frames: the motion between them
 VELOCITY_CHANGE = np.array([1.0, -1, -1, 1])  # weights of two times before and two after a key: the change of velocity
 MAX_BATCH_VALUES = 1_000_000  # maximum number of values in the arrays of one step
+MAX_MATRICES = 1_000_000  # maximum number of world matrices at once, 96 bytes each
 
 
 class SkinMotion:
@@ -36,7 +37,7 @@ class SkinMotion:
         self._scene = scene
         self.is_skin = has_vertices(scene)
         self.surfaces = surfaces(scene) if self.is_skin else []
-        self.rest_world = PosedSkeleton.at_rest(scene.skeleton).world
+        self.rest_world = rest_world(scene.skeleton)[:, None]
         self._lever = (
             orientation_probes.PROBE_DISTANCE * orientation_probes.probe_size(self.rest_world[..., 3])
             if len(scene.skeleton)
@@ -46,8 +47,9 @@ class SkinMotion:
     @cached_property
     def points(self) -> PointMatrix:
         """The outermost points of each joint."""
-        nodes = range(0 if self.is_skin else len(self.skeleton))
-        return point_matrix.sample_points(self._scene, frozenset(nodes), self._lever)
+        if not self.is_skin:
+            return self.vertices
+        return point_matrix.sample_points(self._scene, frozenset(), self._lever)
 
     @cached_property
     def size(self) -> float:
@@ -61,9 +63,11 @@ class SkinMotion:
         Vertices that differ only in texture coordinates or normals always move alike.
         """
         points = point_matrix.all_points(self._scene, self._lever)
+        if not self.is_skin:
+            return points, np.arange(len(points))
         owners = np.repeat([part.owner for part in self.surfaces], [len(part.points) for part in self.surfaces])
-        chosen = points.distinct(owners) if self.is_skin else np.arange(len(points))
-        return points.take(chosen), owners[chosen] if self.is_skin else chosen
+        chosen = points.distinct(owners)
+        return points.take(chosen), owners[chosen]
 
     @property
     def vertices(self) -> PointMatrix:
@@ -106,14 +110,16 @@ class SkinMotion:
         moves = self._combined(clip, times + around, VELOCITY_CHANGE, root, held=times + held)
         return np.asarray(moves / (whole.probe - whole.shortest))
 
-    def squares(self, differences: Floats) -> Floats:
+    def squares(self, differences: Callable[[Ints], Floats]) -> Floats:
         """Return the squared lengths (P, F) of differences of all points.
 
-        differences: of world matrices (N, F, 3, 4).
+        differences: gives those of world matrices (J, F, 3, 4) of nodes (J,).
         """
-        moves = self._rows.moves(point_matrix.stack_points(differences, self.vertices.nodes))
-        moves *= moves
-        return np.asarray(moves.sum(axis=1))
+        return self._rows.squares(point_matrix.stack_blocks(differences, self.vertices.nodes))
+
+    def posed_at_once(self, times: int) -> int:
+        """Return the number of clips, or frames, at so many times each, of which all matrices are computed at once."""
+        return max(MAX_MATRICES // max(times * len(self.skeleton), 1), 1)
 
     def batch_size(self, matrices: int) -> int:
         """Return the number of frames that fit into one batch, with so many matrices per node and frame."""
@@ -131,27 +137,28 @@ class SkinMotion:
 
         weights: (S,). held: times of STEP tracks.
         """
-        stops, frames = times.shape
-        poses, (morphs,) = sample_clips(
-            self.skeleton, [clip], times.reshape(1, -1), step_times=None if held is None else held.reshape(1, -1)
-        )
-        world = world_by_node(self.skeleton, poses)
-        clip_ends.remove_root_motion(self.skeleton, world, root)
-        world = world.reshape(len(world), stops, frames, 3, 4)
-        morphs = {node: each.reshape(stops, frames, -1) for node, each in morphs.items()}
-        count = self.batch_size(stops)
+        most = self.posed_at_once(len(times))
         parts = []
-        for first in range(0, frames, count):
-            cut = slice(first, first + count)
-            parts.append(
-                self._longest(world[:, :, cut], {node: each[:, cut] for node, each in morphs.items()}, weights)
-            )
+        origin: Floats | None = None
+        for start in range(0, times.shape[1], most):
+            some = times[:, start : start + most]
+            stops = None if held is None else held[:, start : start + most].reshape(1, -1)
+            world, (morphs,) = sample_world_matrices(self.skeleton, [clip], some.reshape(1, -1), step_times=stops)
+            origin = world[root, 0, :, 3].copy() if origin is None else origin
+            clip_ends.remove_root_motion(self.skeleton, world, root, origin)
+            world = world.reshape(len(world), *some.shape, 3, 4)
+            morphs = {node: each.reshape(*some.shape, -1) for node, each in morphs.items()}
+            count = self.batch_size(len(times))
+            for first in range(0, some.shape[1], count):
+                cut = slice(first, first + count)
+                of_morphs = {node: each[:, cut] for node, each in morphs.items()}
+                parts.append(self._longest(world[:, :, cut], of_morphs, weights))
         return np.concatenate(parts)
 
     def _longest(self, world: Floats, morphs: Mapping[int, Floats], weights: Floats) -> Floats:
         """world: (N, S, F, 3, 4). morphs: (S, F, M) by node. weights: (S,)."""
         size, stops, frames = world.shape[:3]
-        squares = self.squares(np.tensordot(weights, world, (0, 1)))
+        squares = self.squares(lambda nodes: np.tensordot(weights, world[nodes], (0, 1)))
         morphing = self.exclude_morphing(squares, morphs)
         most = np.sqrt(squares.max(axis=0)).astype(np.float64)
         for mesh in morphing:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from anim.model import Clip, Skeleton, TimeAxis
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.batch import lazy_batches
 from anim.sampling.players import PLAYERS, sampler
-from anim.sampling.pose import PoseSampler
+from anim.sampling.pose import PoseSampler, sample_world_matrices
 from anim.sampling.track import find_interval, sample
 from fixtures.broken.pieces import text
 from tests.clips import about, clip, skeleton, track
@@ -185,3 +186,20 @@ def test_times_that_are_none_are_refused(at: Any, error: type[AnimError]) -> Non
         sample_pose(skeleton([-1]), clip(moving), at)
     with pytest.raises(error, match="times"):
         sample(moving, at)
+
+
+def test_world_matrices_of_several_clips_are_those_of_their_poses() -> None:
+    """Also of nodes without tracks, and with a sheared matrix."""
+    nodes = replace(
+        skeleton([-1, 0, 1, -1], translation=RNG.normal(size=(4, 3)), scale=RNG.uniform(0.5, 2, (4, 3))),
+        sheared=np.array([3]),
+        sheared_local=RNG.normal(size=(1, 3, 4)),
+    )
+    clips = [
+        clip(track("rotation", [0, 1], about("x", [0, 90]), node=1)),
+        clip(track("translation", [0, 1], RNG.normal(size=(2, 3)), node=2)),
+    ]
+    times = RNG.uniform(0, 1, (2, 5))
+    found, _ = sample_world_matrices(nodes, clips, times)
+    for each, at, world in zip(clips, times, np.split(found, 2, axis=1), strict=True):
+        assert (world == np.swapaxes(world_matrices(nodes, sample_pose(nodes, each, at)), 0, 1)).all()

@@ -253,3 +253,20 @@ def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike 
     assert (alone.gap, alone.speed, alone.fastest) == pytest.approx((both[1].gap, both[1].speed, both[1].fastest))
     assert (alone.frame, alone.going_on) == (0.0, alone.gap)
     assert both[1].frame > 0
+
+
+def test_many_nodes_or_frames_are_posed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames and clips one at a time give the same steps and seams, without the root's motion since the first frame."""
+    scene, times = _chain(), np.stack((AT[:-1], AT[1:]))
+    walk = clip(
+        track("translation", AT, np.stack((AT, 0 * AT, 0.1 * SWING), axis=1), node=0),
+        track("rotation", AT, about("z", SWING), node=1),
+    )
+    parts = [LoopRange(each, 0.0, 0.9, 0.1, root=0) for each in (walk, _swinging(j1=3))]
+    skin = SkinMotion(scene)
+    whole = skin.steps(walk, times, 0), skin.velocity_changes(walk, AT[1:-1], 0), measure_seams(skin, parts)
+    monkeypatch.setattr(skin_motion, "MAX_MATRICES", 1)
+    found = skin.steps(walk, times, 0), skin.velocity_changes(walk, AT[1:-1], 0), measure_seams(skin, parts)
+    assert (found[0] == whole[0]).all()
+    assert (found[1] == whole[1]).all()
+    assert found[2] == whole[2]
