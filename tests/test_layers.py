@@ -71,7 +71,7 @@ PUBLIC = {
     "caches.vat": "presets",
     "check.rules": "invalid",
     "curves.easing": "function table",
-    "curves.fitting": "adaptive_keys easing_fit key_reduction rotation_fit",
+    "curves.fitting": "adaptive_keys easing_fit key_reduction rotation_fit stacked_keys",
     "curves.tangents": "rule table",
     "exchange.euler": (
         "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"

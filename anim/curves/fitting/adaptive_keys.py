@@ -72,7 +72,9 @@ def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tu
     values = motion.values(times, False)
     earlier = just_before(times[1:])
     arriving = motion.values(times[1:], True)
-    jumps = np.flatnonzero((_distance(motion, arriving, values[1:]) > JUMP_TOLERANCE) & (earlier > times[:-1]))
+    jumps = np.flatnonzero(
+        (distance(arriving, values[1:], rotation=motion.rotation) > JUMP_TOLERANCE) & (earlier > times[:-1])
+    )
     times = np.insert(times, jumps + 1, earlier[jumps])
     values = np.insert(values, jumps + 1, arriving[jumps], axis=0)
     return times, quaternion.align_signs(values) if motion.rotation else values
@@ -124,7 +126,7 @@ def refine(times: Floats, count: SegmentCount) -> Floats:
     """
     found, a, b = [times], times[:-1], times[1:]
     for _ in range(MAX_ROUNDS):
-        middle = _round_to_float32((a + b) / 2)
+        middle = round_to_float32((a + b) / 2)
         splittable = (middle > a) & (middle < b)
         a, b = a[splittable], b[splittable]
         if not len(a):
@@ -145,14 +147,19 @@ def _count_in_blocks(count: SegmentCount, a: Floats, b: Floats) -> Ints:
 
 def split_segments(a: Floats, b: Floats, counts: Ints) -> tuple[Floats, Floats]:
     """Segments from a to b (B,) split evenly at float32-exact times, without empty ones: starts, ends."""
+    return number_parts(a, b, counts)[1:]
+
+
+def number_parts(a: Floats, b: Floats, counts: Ints) -> tuple[Ints, Floats, Floats]:
+    """Return the parts of `split_segments`, and before them the index (P,) of the segment of each."""
     piece = np.repeat(np.arange(len(a)), counts)
     step = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
     length = (b - a)[piece] / counts[piece]
-    starts = np.where(step == 0, a[piece], _round_to_float32(a[piece] + step * length))
+    starts = np.where(step == 0, a[piece], round_to_float32(a[piece] + step * length))
     last = step == counts[piece] - 1
-    ends = np.where(last, b[piece], _round_to_float32(a[piece] + (step + 1) * length))
+    ends = np.where(last, b[piece], round_to_float32(a[piece] + (step + 1) * length))
     some = ends > starts
-    return starts[some], ends[some]
+    return piece[some], starts[some], ends[some]
 
 
 def sample_times(a: Floats, b: Floats, inner: int) -> Floats:
@@ -205,8 +212,9 @@ def _split_by_travel(motion: TrackFunction, knots: Floats) -> Floats:
     return np.append(split_segments(knots[:-1], knots[1:], counts.astype(np.int64))[0], knots[-1])
 
 
-def _distance(motion: TrackFunction, p: Floats, q: Floats) -> Floats:
-    return quaternion.angle_between(p, q) if motion.rotation else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))
+def distance(p: Floats, q: Floats, *, rotation: bool) -> Floats:
+    """Return the distances (...) of values (..., C): angles in radians of rotations."""
+    return quaternion.angle_between(p, q) if rotation else np.asarray(np.sqrt(((p - q) ** 2).sum(axis=-1)))
 
 
 def _cubic_error(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
@@ -229,5 +237,6 @@ def _cubic_error(motion: TrackFunction, start: Floats, end: Floats) -> Floats:
     return np.where(angle > MAX_ANGLE_RAD, np.inf, error)
 
 
-def _round_to_float32(times: Floats) -> Floats:
+def round_to_float32(times: Floats) -> Floats:
+    """Return the nearest times (T,) that float32 holds."""
     return np.asarray(times.astype(np.float32).astype(np.float64))

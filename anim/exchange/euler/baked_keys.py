@@ -35,7 +35,10 @@ def is_baked(motion: EulerMotion, node: EulerNode, keys: KeyPlacement) -> bool:
         return keys == KeyPlacement.GRID
     if motion.sampled is not None:
         return motion.sampled
-    changing = [curve for curve in curves_of(node) if not curve.is_constant]
+    curves = curves_of(node)
+    if all(len(curve.values) < MIN_BAKED_KEYS for curve in curves):
+        return False
+    changing = [curve for curve in curves if not curve.is_constant]
     return bool(changing) and all(_is_dense(curve, changing[0]) for curve in changing)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,24 @@ class Mode(IntEnum):
 
 
 MODES = {mode.name.lower(): mode for mode in Mode}
+
+
+class Keys(NamedTuple):
+    """Keys of one curve, or of several ones after each other (S in all): the fields of `Curve`, all (S,)."""
+
+    times: Floats
+    values: Floats
+    modes: NDArray[np.uint8]
+    in_tangents: Floats | None = None
+    out_tangents: Floats | None = None
+    in_weights: Floats | None = None
+    out_weights: Floats | None = None
+
+    def weights(self, left: Ints, right: Ints) -> tuple[Floats | float, Floats | float]:
+        """Return the handle lengths after keys `left` and before keys `right`, as fractions of the segment."""
+        leaving = DEFAULT_WEIGHT if self.out_weights is None else self.out_weights[left]
+        arriving = DEFAULT_WEIGHT if self.in_weights is None else self.in_weights[right]
+        return leaving, arriving
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +80,12 @@ class Curve:
             raise ShapeError("a cubic curve lacks tangents")
 
     @property
+    def keys(self) -> Keys:
+        """All keys, as plain arrays."""
+        handles = self.in_tangents, self.out_tangents, self.in_weights, self.out_weights
+        return Keys(self.times, self.values, self.modes, *handles)
+
+    @property
     def times(self) -> Floats:
         """Key times (K,) in seconds."""
         return self.time_axis.times
@@ -90,13 +114,6 @@ class Curve:
         handles = {name: None if part is None else part[keys] for name, part in parts.items()}
         return Curve(times, self.values[keys], self.modes[keys], **handles)
 
-    def weights(self, left: Ints, right: Ints) -> tuple[Floats, Floats]:
-        """Return the handle lengths after keys `left` and before keys `right`, as fractions of the segment."""
-        third = np.full(len(self.times), DEFAULT_WEIGHT)
-        leaving = third if self.out_weights is None else self.out_weights
-        arriving = third if self.in_weights is None else self.in_weights
-        return leaving[left], arriving[right]
-
 
 def constant(value: float) -> Curve:
     """Return a constant curve: a single key at 0 s."""
@@ -123,21 +140,28 @@ def evaluate(curve: Curve, at: Floats, *, before: bool = False) -> Floats:
     left = np.clip(place - 1, 0, len(curve.times) - 1)
     if len(curve.times) == 1:
         return curve.values[left]
-    right = np.minimum(left + 1, len(curve.times) - 1)
-    duration = curve.times[right] - curve.times[left]
-    inside = (at > curve.times[left]) & (duration > 0) & (curve.modes[left] != Mode.STEP)
-    u = np.where(inside, (at - curve.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
-    start, end = curve.values[left], curve.values[right]
+    return interpolate(curve.keys, left, np.minimum(left + 1, len(curve.times) - 1), at)
+
+
+def interpolate(keys: Keys, left: Ints, right: Ints, at: Floats) -> Floats:
+    """Return the values at times `at` (any shape) between keys `left` and the next ones `right`, of that shape.
+
+    Values before `left`, and those of a last key, where right = left, are the key's own.
+    """
+    duration = keys.times[right] - keys.times[left]
+    inside = (at > keys.times[left]) & (duration > 0) & (keys.modes[left] != Mode.STEP)
+    u = np.where(inside, (at - keys.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
+    start, end = keys.values[left], keys.values[right]
     values: Floats = np.where(u == 1, end, start + u * (end - start))
-    cubic: Any = inside & (curve.modes[left] == Mode.CUBIC)
+    cubic: Any = inside & (keys.modes[left] == Mode.CUBIC)
     if cubic.any():
-        assert curve.in_tangents is not None
-        assert curve.out_tangents is not None
-        leaving, arriving = duration * curve.out_tangents[left], duration * curve.in_tangents[right]
-        if curve.in_weights is None and curve.out_weights is None:
+        assert keys.in_tangents is not None
+        assert keys.out_tangents is not None
+        leaving, arriving = duration * keys.out_tangents[left], duration * keys.in_tangents[right]
+        if keys.in_weights is None and keys.out_weights is None:
             values = np.where(cubic, hermite.evaluate(u, start, leaving, end, arriving), values)
         else:
-            first, second = curve.weights(left, right)
+            first, second = keys.weights(left, right)
             s = bezier.parameter(u, first, 1 - second)
             points = (start, start + first * leaving, end - second * arriving, end)
             values = np.where(cubic, _bezier(s, *points), values)
@@ -157,16 +181,21 @@ def travel(curve: Curve, a: Floats, b: Floats) -> Floats:
     straight = np.abs(evaluate(curve, b, before=True) - evaluate(curve, a))
     if not (curve.modes == Mode.CUBIC).any():
         return straight
-    assert curve.in_tangents is not None
-    assert curve.out_tangents is not None
     left = np.clip(np.searchsorted(curve.times, a, side="right") - 1, 0, len(curve.times) - 1)
     right = np.minimum(left + 1, len(curve.times) - 1)
-    duration, (leaving, arriving) = curve.times[right] - curve.times[left], curve.weights(left, right)
+    inside = (curve.modes[left] == Mode.CUBIC) & (a >= curve.times[0])
+    return np.where(inside, control_length(curve.keys, left, right), straight)
+
+
+def control_length(keys: Keys, left: Ints, right: Ints) -> Floats:
+    """Return the lengths (...) of the Bézier polygons of cubics from keys `left` to `right` (...)."""
+    assert keys.in_tangents is not None
+    assert keys.out_tangents is not None
+    duration, (leaving, arriving) = keys.times[right] - keys.times[left], keys.weights(left, right)
     points = (
-        curve.values[left],
-        curve.values[left] + leaving * duration * curve.out_tangents[left],
-        curve.values[right] - arriving * duration * curve.in_tangents[right],
-        curve.values[right],
+        keys.values[left],
+        keys.values[left] + leaving * duration * keys.out_tangents[left],
+        keys.values[right] - arriving * duration * keys.in_tangents[right],
+        keys.values[right],
     )
-    bound = sum(np.abs(q - p) for p, q in pairwise(points))
-    return np.where((curve.modes[left] == Mode.CUBIC) & (a >= curve.times[0]), bound, straight)
+    return np.asarray(sum(np.abs(q - p) for p, q in pairwise(points)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from anim.curves.fitting.adaptive_keys import TrackFunction, linear_keys
 from anim.errors import AnimError, RangeError
 from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement, curves_of, is_baked
-from anim.exchange.euler.curve import Curve, Mode, travel
+from anim.exchange.euler.curve import Mode, travel
 from anim.exchange.euler.evaluate import (
     bounding_size,
     evaluate_rotation,
@@ -18,8 +19,10 @@ from anim.exchange.euler.evaluate import (
     skeleton,
 )
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
+from anim.exchange.euler.node_stack import PATHS, path_curves
+from anim.exchange.euler.stacked_tracks import NodeKeys, blocks, stacked_keys
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Skeleton, Track
+from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.model.time_axis import merge_times
 from anim.model.track import share_time_axes
 
@@ -60,61 +63,85 @@ def from_euler(
         raise RangeError(f"`tolerance` is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
     bones = skeleton(motion)
     size = bounding_size(bones) or 1.0
-    stored = Float32Times()
-    tracks: list[Track] = []
+    builder = _TrackBuilder(size)
     adaptive = False
-    for number, node in enumerate(motion.nodes):
-        on_grid = is_baked(motion, node, keys)
-        adaptive |= not on_grid and any(not curve.is_constant for curve in curves_of(node))
-        try:
-            tracks += _tracks(number, stored.node(node), None if on_grid else tolerance, size)
-        except AnimError as error:
-            raise error.at(f"node '{node.name}'") from None
+    for block in blocks(motion.nodes):
+        nodes = {number: motion.nodes[number] for number in block}
+        on_grid = {number: is_baked(motion, node, keys) for number, node in nodes.items()}
+        adaptive = adaptive or any(not on_grid[number] and _changes(node) for number, node in nodes.items())
+        builder.add(nodes, {number: None if on_grid[number] else tolerance for number in nodes})
     ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
-    return ImportedMotion(bones, Clip(name, tuple(share_time_axes(tracks))), ends, tolerance if adaptive else None)
+    tracks = tuple(share_time_axes(builder.tracks))
+    return ImportedMotion(bones, Clip(name, tracks), ends, tolerance if adaptive else None)
 
 
-def _tracks(number: int, node: EulerNode, tolerance: float | None, size: float) -> list[Track]:
-    """Tracks of one node; tolerance None adds no keys."""
-    turning = [curve for curve in node.rotation if curve is not None]
-    moving, scaling = [*node.moves.values()], [*node.scales.values()]
-    if node.pivots is not NO_PIVOTS:
-        moving = curves_of(node)
-    translation = TrackFunction(lambda at, before: evaluate_translation(node, at, before), rotation=False)
-    rotation = TrackFunction(
-        lambda at, before: evaluate_rotation(node, at, before),
-        rotation=True,
-        travel=lambda a, b: np.asarray(sum((travel(curve, a, b) for curve in turning), np.zeros(len(a)))),
-    )
-    scale = TrackFunction(lambda at, before: evaluate_scale(node, at, before), rotation=False)
-    parts = (
-        ("translation", moving, translation, size),
-        ("rotation", turning, rotation, 1.0),
-        ("scale", scaling, scale, 1.0),
-    )
-    tracks = [
-        _track(number, name, curves, path, None if tolerance is None else tolerance * unit)
-        for name, curves, path, unit in parts
-        if curves
-    ]
-    return [track for track in tracks if not _is_rest(track, node, size)]
+def _changes(node: EulerNode) -> bool:
+    return any(not curve.is_constant for curve in curves_of(node))
 
 
-def _track(number: int, name: str, curves: list[Curve], path: TrackFunction, tolerance: float | None) -> Track:
+class _TrackBuilder:
+    """Tracks of nodes in their order; those at rest are omitted. size: of the skeleton, in metres."""
+
+    def __init__(self, size: float) -> None:
+        self.tracks: list[Track] = []
+        self._size = size
+        self._units = {"translation": size, "rotation": 1.0, "scale": 1.0}
+        self._stored = Float32Times()
+        self._axes: dict[bytes, TimeAxis] = {}
+
+    def add(self, nodes: Mapping[int, EulerNode], tolerances: Mapping[int, float | None]) -> None:
+        """Add the tracks of nodes; their tolerances in radians, None adds no keys."""
+        found = stacked_keys(nodes, tolerances, self._units)
+        for number, node in nodes.items():
+            try:
+                for path in PATHS:
+                    if path_curves(node, path):
+                        keys = found.get((number, path)) or self._alone(node, path, tolerances[number])
+                        self._add(number, node, path, keys)
+            except AnimError as error:
+                raise error.at(f"node '{node.name}'") from None
+
+    def _alone(self, node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
+        unit = self._units[path]
+        return node_keys(self._stored.node(node), path, None if tolerance is None else tolerance * unit)
+
+    def _add(self, number: int, node: EulerNode, path: str, keys: NodeKeys) -> None:
+        """Add a track unless it is equal to the rest pose: many recorders write six channels for every joint."""
+        if path == "translation" and (node.parent >= 0 or node.pivots is not NO_PIVOTS):
+            still = node.translation if node.pivots is NO_PIVOTS else keys.values[0]
+            if (np.abs(keys.values - still) <= CONSTANT_TOLERANCE * self._size).all():
+                return
+        content = keys.times.tobytes()
+        axis = self._axes.get(content)
+        if axis is None:
+            axis = self._axes[content] = TimeAxis(keys.times)
+        self.tracks.append(Track(number, path, keys.interpolation, axis, keys.values))
+
+
+def node_keys(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
+    """Return the keys of one path of a node; tolerance, in the path's own unit: None adds no keys.
+
+    The node's times are those of float32. `stacked_keys` gives many short nodes the same ones.
+    """
+    curves = path_curves(node, path)
     knots = merge_times(curve.time_axis for curve in curves)
     changing = [curve for curve in curves if not curve.is_constant]
     stepped = bool(changing) and all((curve.modes[:-1] == Mode.STEP).all() for curve in changing)
+    motion = _function(node, path)
     if stepped or tolerance is None:
-        values = path.values(knots, False)
-        values = quaternion.align_signs(values) if path.rotation else values
-        return Track(number, name, Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
-    times, values = linear_keys(path, knots, tolerance=tolerance)
-    return Track(number, name, Interpolation.LINEAR, times, values)
+        values = motion.values(knots, False)
+        values = quaternion.align_signs(values) if motion.rotation else values
+        return NodeKeys(Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
+    return NodeKeys(Interpolation.LINEAR, *linear_keys(motion, knots, tolerance=tolerance))
 
 
-def _is_rest(track: Track, node: EulerNode, size: float) -> bool:
-    """True for a track equal to the rest pose: many recorders write six channels for every joint."""
-    if track.path != "translation" or (node.parent < 0 and node.pivots is NO_PIVOTS):
-        return False
-    still = evaluate_translation(node, track.times[:1])[0] if node.pivots is not NO_PIVOTS else node.translation
-    return bool((np.abs(track.values - still) <= CONSTANT_TOLERANCE * size).all())
+def _function(node: EulerNode, path: str) -> TrackFunction:
+    if path == "translation":
+        return TrackFunction(lambda at, before: evaluate_translation(node, at, before), rotation=False)
+    if path == "scale":
+        return TrackFunction(lambda at, before: evaluate_scale(node, at, before), rotation=False)
+    return TrackFunction(
+        lambda at, before: evaluate_rotation(node, at, before),
+        rotation=True,
+        travel=lambda a, b: np.asarray(sum((travel(c, a, b) for c in path_curves(node, path)), np.zeros(len(a)))),
+    )

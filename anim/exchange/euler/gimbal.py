@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Floats
-from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, Pivots
+from anim.arrays import Floats, Ints
+from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode, Pivots
 from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, AxesConvention
-from anim.model import Clip, Interpolation, TimeAxis, Track
-from anim.sampling.track import sample
+from anim.model import Clip, Interpolation, Track
+from anim.sampling.track_stack import TrackStack
 
 NEAR_LOCK_RAD = np.radians(5.0)  # from lock: rates are amplified 23 times there
 SUFFICIENT_KEYS, SAMPLES_PER_INTERVAL = 500, 29  # sufficient keys; samples per interval with fewer keys
 ANGLE_TOLERANCE_RAD = 1e-9  # rad; smaller differences are ignored: the first counts
-MAX_BATCH_QUATERNIONS = 200_000  # quaternions evaluated together
+MAX_BATCH_QUATERNIONS = 50_000  # quaternions evaluated together
+SAME_DISTANCE = {"XZX": "XYX", "YZY": "YXY", "ZYZ": "ZXZ"}  # locked where the first axis comes back to itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,74 +52,118 @@ def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
     between them. Pre and post rotations are removed: the three angles are between them.
     Source: the Jacobian's singular values are 1, √(1 + s), √(1 − s), s the cosine of the distance from lock.
     """
-    rows = []
-    for times, nodes, values in _stack_angles(motion, clip):
-        by_order = {order: euler.gimbal_distance(values, order=order) for order in ORDERS}
-        nearest = {order: distance.min(axis=0) for order, distance in by_order.items()}
-        for i, node in enumerate(nodes):
-            about = motion.nodes[node]
-            order = about.order if about.frame == AxesConvention.INTRINSIC else about.order[::-1]
-            best = max(ORDERS, key=lambda each: float(nearest[each][i]))
-            if nearest[best][i] <= nearest[order][i] + 1e-9:
-                best = order
-            own = by_order[order][:, i]
-            rows.append((node, _row(motion, node, times, own, best, float(nearest[best][i]))))
+    rows: list[tuple[int, GimbalStats]] = []
+    for tracks in _batches(motion, clip):
+        nodes = [motion.nodes[track.node] for track in tracks if track.node is not None]
+        samples = _samples(tracks)
+        turns = _without_pivots([node.pivots for node in nodes], samples)
+        by_order = {order: euler.gimbal_distance(turns, order=order) for order in ORDERS if order not in SAME_DISTANCE}
+        by_order |= {order: by_order[other] for order, other in SAME_DISTANCE.items()}
+        found = _rows(nodes, samples, np.stack([by_order[order] for order in ORDERS]))
+        rows += zip((track.node or 0 for track in tracks), found, strict=True)
     return tuple(row for _, row in sorted(rows, key=lambda each: each[0]))
 
 
-def _stack_angles(motion: EulerMotion, clip: Clip) -> Iterator[tuple[Floats, list[int], Floats]]:
-    """Yield tracks of one time axis: times (K,), nodes, rotations (K, G, 4), sized for CPU caches."""
-    groups: dict[tuple[TimeAxis, bool], list[tuple[int, Track]]] = {}
+class _Samples(NamedTuple):
+    """Rotations (S, 4) of G tracks at times (S,) s, one track after the other.
+
+    track: (S,) index of each sample's track. starts: (G,) index of the first sample of each.
+    """
+
+    track: Ints
+    starts: Ints
+    times: Floats
+    rotations: Floats
+
+
+def _batches(motion: EulerMotion, clip: Clip) -> Iterator[list[Track]]:
+    """Yield the rotations to evaluate together, of one interpolation, sized for CPU caches."""
+    groups: dict[tuple[Interpolation, bool], list[Track]] = {}
     for track in clip.tracks:
         if track.path == "rotation" and track.node is not None and motion.nodes[track.node].order in ORDERS:
-            groups.setdefault((track.time_axis, _keys_suffice(track)), []).append((track.node, track))
-    for (axis, at_keys), group in groups.items():
-        times = axis.times if at_keys else _check_times(axis.times)
-        count = max(MAX_BATCH_QUATERNIONS // len(times), 1)
-        for start in range(0, len(group), count):
-            part = group[start : start + count]
-            turns = [
-                _without_pivots(motion.nodes[node].pivots, track.values if at_keys else sample(track, times))
-                for node, track in part
-            ]
-            yield times, [node for node, _ in part], np.stack(turns, axis=1)
+            groups.setdefault((track.interpolation, _keys_suffice(track)), []).append(track)
+    for (_, at_keys), group in groups.items():
+        samples = np.array([len(track.times) for track in group]) * (1 if at_keys else SAMPLES_PER_INTERVAL + 1)
+        batch = (np.cumsum(samples) - samples) // MAX_BATCH_QUATERNIONS
+        bounds = np.flatnonzero(np.diff(batch, prepend=-1, append=-1)).tolist()
+        yield from (group[first:last] for first, last in pairwise(bounds))
 
 
 def _keys_suffice(track: Track) -> bool:
     return len(track.times) > SUFFICIENT_KEYS or track.interpolation is Interpolation.STEP or len(track.times) == 1
 
 
-def _check_times(keys: Floats) -> Floats:
-    """Keys with SAMPLES_PER_INTERVAL more times per interval."""
-    shares = np.arange(SAMPLES_PER_INTERVAL + 1) / (SAMPLES_PER_INTERVAL + 1)
-    return np.append((keys[:-1, None] + np.diff(keys)[:, None] * shares).ravel(), keys[-1])
+def _samples(tracks: Sequence[Track]) -> _Samples:
+    """Keys of tracks of one batch, or with few keys also SAMPLES_PER_INTERVAL more times per interval."""
+    stack = TrackStack(tracks)
+    keys = stack.keys
+    track = np.repeat(np.arange(len(tracks)), keys.counts)
+    if _keys_suffice(tracks[0]):
+        return _Samples(track, keys.starts, keys.times, stack.values)
+    is_last = np.append(track[1:] != track[:-1], True)
+    duration = np.where(is_last, 0.0, np.append(np.diff(keys.times), 0.0))
+    counts = np.where(is_last, 1, SAMPLES_PER_INTERVAL + 1)
+    first: Ints = np.cumsum(counts) - counts
+    left = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(len(left)) - first[left]) / (SAMPLES_PER_INTERVAL + 1)
+    times = keys.times[left] + duration[left] * share
+    values = stack.interpolate(left, np.where(is_last[left], left, left + 1), times)
+    return _Samples(track[left], first[keys.starts], times, values)
 
 
-def _without_pivots(pivots: Pivots, q: Floats) -> Floats:
-    """R (K, 4) from Rpre · R · Rpost⁻¹."""
-    if pivots is NO_PIVOTS:
+def _without_pivots(pivots: Sequence[Pivots], samples: _Samples) -> Floats:
+    """R (S, 4) from Rpre · R · Rpost⁻¹."""
+    q = samples.rotations
+    some = np.array([each is not NO_PIVOTS for each in pivots])[samples.track]
+    if not some.any():
         return q
-    return quaternion.multiply(quaternion.multiply(quaternion.conjugate(pivots.pre_rotation), q), pivots.post_rotation)
+    before = np.array([each.pre_rotation for each in pivots])[samples.track[some]]
+    after = np.array([each.post_rotation for each in pivots])[samples.track[some]]
+    turns = q.copy()
+    turns[some] = quaternion.multiply(quaternion.multiply(quaternion.conjugate(before), q[some]), after)
+    return turns
 
 
-def _row(
-    motion: EulerMotion, node: int, times: Floats, distance: Floats, best: str, best_nearest: float
-) -> GimbalStats:
-    about = motion.nodes[node]
-    least = int((distance <= distance.min() + ANGLE_TOLERANCE_RAD).argmax())
-    spans = np.zeros(len(times))  # each key covers half the interval to its neighbors
-    spans[1:] += np.diff(times) / 2
-    spans[:-1] += np.diff(times) / 2
-    sine = min(float(np.cos(distance[least])), 1 - 1e-12)
-    return GimbalStats(
-        about.name,
-        about.order,
-        str(about.frame),
-        float(np.degrees(distance[least])),
-        float(times[least]),
-        float(spans[distance < NEAR_LOCK_RAD].sum()),
-        float(np.sqrt((1 + sine) / (1 - sine))),
-        f"{about.order[0]} and {about.order[2]}" if about.order[0] != about.order[2] else f"both {about.order[0]}",
-        best if about.frame == AxesConvention.INTRINSIC else best[::-1],
-        float(np.degrees(best_nearest)),
-    )
+def _rows(nodes: Sequence[EulerNode], samples: _Samples, distances: Floats) -> Iterator[GimbalStats]:
+    """Yield the statistics of nodes; distances: (12, S) of their samples, by order."""
+    intrinsic = [n.order if n.frame == AxesConvention.INTRINSIC else n.order[::-1] for n in nodes]
+    order = np.array([ORDERS.index(each) for each in intrinsic])
+    nearest = np.minimum.reduceat(distances, samples.starts, axis=1)
+    usual = nearest[order, np.arange(len(nodes))]
+    best = np.where(nearest.max(axis=0) <= usual + ANGLE_TOLERANCE_RAD, order, nearest.argmax(axis=0))
+    margin = np.degrees(nearest[best, np.arange(len(nodes))])
+    own = distances[order[samples.track], np.arange(len(samples.track))]
+    close = np.flatnonzero(own <= usual[samples.track] + ANGLE_TOLERANCE_RAD)
+    least = close[np.searchsorted(close, samples.starts)]  # the first of each track
+    sine = np.minimum(np.cos(own[least]), 1 - 1e-12)
+    columns = np.degrees(own[least]), samples.times[least], np.sqrt((1 + sine) / (1 - sine)), margin
+    near = _near_times(samples, own)
+    for i, (about, better, row) in enumerate(
+        zip(nodes, best.tolist(), np.stack(columns, axis=1).tolist(), strict=True)
+    ):
+        first, last = about.order[0], about.order[2]
+        yield GimbalStats(
+            about.name,
+            about.order,
+            str(about.frame),
+            row[0],
+            row[1],
+            near.get(i, 0.0),
+            row[2],
+            f"{first} and {last}" if first != last else f"both {first}",
+            ORDERS[better] if about.frame == AxesConvention.INTRINSIC else ORDERS[better][::-1],
+            row[3],
+        )
+
+
+def _near_times(samples: _Samples, distance: Floats) -> dict[int, float]:
+    """Seconds within NEAR_LOCK_RAD by index of the track; each sample covers half the interval to its neighbors."""
+    near = np.flatnonzero(distance < NEAR_LOCK_RAD)
+    if not len(near):
+        return {}
+    half = np.where(samples.track[1:] == samples.track[:-1], np.diff(samples.times) / 2, 0.0)
+    spans = np.zeros(len(samples.times))
+    spans[1:] += half
+    spans[:-1] += half
+    bounds = np.flatnonzero(np.diff(samples.track[near], prepend=-1, append=-1)).tolist()
+    return {int(samples.track[near[i]]): float(spans[near[i:j]].sum()) for i, j in pairwise(bounds)}

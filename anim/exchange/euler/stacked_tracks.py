@@ -1,0 +1,93 @@
+"""Keys of many short nodes in one pass per convention and path: `from_euler` of thousands of nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from anim.arrays import Bools, Floats, freeze
+from anim.curves.fitting.stacked_keys import MotionStack, StackedKeys, align_signs, stacked_linear_keys
+from anim.exchange.euler.baked_keys import curves_of
+from anim.exchange.euler.motion import NO_PIVOTS, EulerNode
+from anim.exchange.euler.node_stack import PATHS, NodeStack
+from anim.maths.euler import AxesConvention
+from anim.model import Interpolation
+
+MAX_NODE_KEYS = 2048  # of all curves; nodes with more take as long alone
+BLOCK_KEYS = 1 << 14  # of nodes converted together, if they have several
+
+
+class NodeKeys(NamedTuple):
+    """Keys of one path of a node: times (K,) s, values (K, C)."""
+
+    interpolation: Interpolation
+    times: Floats
+    values: Floats
+
+
+def blocks(nodes: Sequence[EulerNode]) -> Iterator[range]:
+    """Yield ranges of nodes to convert together, so that memory is that of one block."""
+    first, keys = 0, 0
+    for number, node in enumerate(nodes):
+        keys += _num_keys(node)
+        if keys > BLOCK_KEYS:
+            yield range(first, number + 1)
+            first, keys = number + 1, 0
+    yield range(first, len(nodes))
+
+
+def stacked_keys(
+    nodes: Mapping[int, EulerNode], tolerances: Mapping[int, float | None], units: Mapping[str, float]
+) -> dict[tuple[int, str], NodeKeys]:
+    """Return keys by node and path; nodes and paths that take as long alone are omitted.
+
+    tolerances: rad, of each node; None adds no keys. units: of the tolerance by path: metres and factors per radian.
+    """
+    groups: dict[tuple[str, AxesConvention, bool], list[int]] = {}
+    for number, node in nodes.items():
+        if 0 < _num_keys(node) <= MAX_NODE_KEYS:
+            groups.setdefault((node.order, node.frame, node.pivots is NO_PIVOTS), []).append(number)
+    found: dict[tuple[int, str], NodeKeys] = {}
+    for numbers in groups.values():
+        stack = NodeStack([nodes[number] for number in numbers])
+        for path in PATHS:
+            sampled = np.array([tolerances[number] is None for number in numbers])
+            tolerance = max((t for number in numbers if (t := tolerances[number]) is not None), default=0.0)
+            for i, keys in _path_keys(stack, path, sampled, tolerance * units[path]):
+                found[numbers[i], path] = keys
+    return found
+
+
+def _path_keys(stack: NodeStack, path: str, sampled: Bools, tolerance: float) -> Iterator[tuple[int, NodeKeys]]:
+    """Yield the keys of one path by index of the node; sampled: (M,) True for nodes without added keys."""
+    node, knots = stack.knots(path)
+    stepped = stack.is_stepped(path)
+    at_knots = (sampled | stepped)[node]
+    if at_knots.any():
+        part, times = node[at_knots], knots[at_knots]
+        values = stack.values(path, part, times, False)
+        values = align_signs(part, values) if path == "rotation" else values
+        yield from _by_node(StackedKeys(part, times, values), stepped)
+    if not at_knots.all():
+        motions = MotionStack(
+            lambda which, at, before: stack.values(path, which, at, before),
+            rotation=path == "rotation",
+            travel=stack.travel if path == "rotation" else None,
+        )
+        keys = stacked_linear_keys(motions, node[~at_knots], knots[~at_knots], tolerance=tolerance)
+        yield from _by_node(keys, stepped)
+
+
+def _by_node(keys: StackedKeys, stepped: Bools) -> Iterator[tuple[int, NodeKeys]]:
+    values = freeze(keys.values)
+    bounds = np.flatnonzero(np.diff(keys.motion, prepend=-1, append=-1))  # of nodes
+    starts, ends = bounds[:-1], bounds[1:]
+    for node, start, end in zip(keys.motion[starts].tolist(), starts.tolist(), ends.tolist(), strict=True):
+        mode = Interpolation.STEP if stepped[node] else Interpolation.LINEAR
+        yield node, NodeKeys(mode, keys.times[start:end], values[start:end])
+
+
+def _num_keys(node: EulerNode) -> int:
+    return sum(len(curve.values) for curve in curves_of(node))
