@@ -86,7 +86,7 @@ ODD = {
 
 
 # Those of many keys, or with a text of 100 000 letters to draw.
-SLOW = ("27 hours-resample", "27 hours-spline", "27 hours-sample", "long names-plot")
+SLOW = ("27 hours-resample", "27 hours-spline", "27 hours-sample", "27 hours-optimize", "long names-plot")
 
 
 def odd_clips() -> Iterator[Any]:

@@ -109,7 +109,7 @@ def test_a_worker_that_is_ended_costs_nothing(how: signal.Signals, crowd: Path) 
 @pytest.mark.parametrize(
     ("how", "options"),
     [
-        (signal.SIGKILL, ()),
+        pytest.param(signal.SIGKILL, (), marks=pytest.mark.slow),
         pytest.param(signal.SIGKILL, ("--no-cache",), marks=pytest.mark.slow),
         pytest.param(signal.SIGTERM, (), marks=pytest.mark.slow),
         (signal.SIGINT, ("--no-cache",)),

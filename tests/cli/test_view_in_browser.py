@@ -28,6 +28,7 @@ COMPARED = ("Fox.glb", "CesiumMan.glb", "Robot.glb", "MorphStressTest.glb", "Bit
 RELATIVE_TOLERANCE = 1e-3  # between the page, in float32, and `diff`
 
 
+@pytest.mark.slow
 @needs_browser
 def test_every_key_of_two_files_and_names_with_markup(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     one, small = tmp_path / "a.glb", tmp_path / "b.glb"

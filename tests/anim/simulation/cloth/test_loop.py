@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from anim.arrays import Floats
 from anim.simulation.cloth.loop import MAX_ROUNDS, close_loop, loop_rows
@@ -67,6 +68,7 @@ def test_the_seam_is_where_two_rounds_are_nearest() -> None:
     assert (loop_rows(seam.first, 60) % 60 == np.arange(61) % 60).all()
 
 
+@pytest.mark.slow
 def test_a_seam_inside_the_clip_leaves_pinned_points_on_it() -> None:
     scene, clip, node, pinned = flag()
     options = ClothOptions(environment=Environment(wind=(6.0, 0, 2)), duration=3.0, loop=True)
