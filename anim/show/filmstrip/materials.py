@@ -18,7 +18,7 @@ from anim.gltf.reading.vertex_colors import VertexColors, no_vertex_colors, read
 from anim.model import MeshPart, VertexCache
 from anim.show.filmstrip import palette
 from anim.show.filmstrip.surface import OPAQUE, Coating, Surface
-from anim.show.filmstrip.texture import Texels, TextureSampler, decode_image
+from anim.show.filmstrip.texture import PixelBudget, Texels, TextureSampler, decode_image
 
 
 class MaterialReader:
@@ -31,7 +31,8 @@ class MaterialReader:
         self._document, self._resolve, self._note = document, resolve, note
         self._accessors = Accessors(document)
         self._materials = read_materials(document, note)
-        self._images: dict[int, Texels | None] = {}
+        self._images: dict[object, Texels | None] = {}
+        self._pixels = PixelBudget()
         self._read: dict[str, VertexColors] = {}
 
     def surface(self, cache: VertexCache) -> tuple[Surface, Floats]:
@@ -89,13 +90,16 @@ class MaterialReader:
         return Coating(TextureSampler(texels, texture.wrap, texture.nearest), material.factor[3], cutoff)
 
     def _image(self, index: int) -> Texels | None:
-        if index not in self._images:
+        image = json_array(self._document.json, "images")[index]
+        source = image.get("bufferView", image.get("uri"))  # several images of a file may share it
+        if source not in self._images:
             try:
-                self._images[index] = decode_image(image_data(self._document, index, self._accessors, self._resolve))
+                data = image_data(self._document, index, self._accessors, self._resolve)
+                self._images[source] = decode_image(data, self._pixels)
             except AnimError as error:
                 self._note(f"{error.at(f'image {index}', ': ')}: drawn without it")
-                self._images[index] = None
-        return self._images[index]
+                self._images[source] = None
+        return self._images[source]
 
 
 def _is_black(colors: Floats) -> bool:

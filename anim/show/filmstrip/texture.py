@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 1024  # texels; larger images are reduced, since frames have a few hundred pixels
 MAX_PIXELS = 1 << 27  # of an image in the file
+FREE_PIXELS = 1 << 25  # of all images of a file, and as many per encoded byte as good compression has
+PIXELS_PER_BYTE = 32
 DECODER_ERRORS = (OSError, ValueError, SyntaxError, EOFError, IndexError, struct.error)  # errors of decoders
+REDUCIBLE = ("L", "RGB", "RGBA")  # modes in which Pillow averages pixels; a conversion of all of them takes memory
 FORMATS = ("PNG", "JPEG", "WEBP")
 LINEAR = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)  # linear light of each byte, the inverse of `to_srgb`
 GRAY_16 = 65535  # largest gray level of 16-bit PNG
@@ -59,10 +62,26 @@ class TextureSampler:
         return rgba
 
 
-def decode_image(data: Bytes) -> Texels:
+class PixelBudget:
+    """Pixels that the images of a file may still have, decoded: a few bytes can say that they are many."""
+
+    def __init__(self) -> None:
+        self._left = FREE_PIXELS
+
+    def take(self, width: int, height: int, size: int) -> None:
+        """Count an image of `size` encoded bytes. Raises FormatError if it has too many pixels."""
+        left = self._left + PIXELS_PER_BYTE * size
+        limit = min(left, MAX_PIXELS)
+        if width * height > limit:
+            raise FormatError(f"has {width} × {height} pixels (limit {limit / 1e6:.3g} million, by the file's size)")
+        self._left = left - width * height
+
+
+def decode_image(data: Bytes, budget: PixelBudget | None = None) -> Texels:
     """Return the texels (H, W, 4) of an encoded image, reduced where it has more than 1024 on a side.
 
-    Raises FormatError for data that is no PNG, JPEG or WebP, damaged images, and more than MAX_PIXELS.
+    budget: of all images of the file. Raises FormatError for data that is no PNG, JPEG or WebP, damaged images, and
+    too many pixels.
     """
     from PIL import Image
 
@@ -70,12 +89,13 @@ def decode_image(data: Bytes) -> Texels:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of sizes (checked below) and of odd metadata
             image = Image.open(io.BytesIO(data.tobytes()), formats=FORMATS)
-            if image.width * image.height > MAX_PIXELS:
-                raise FormatError(f"has {image.width} × {image.height} pixels (limit {MAX_PIXELS // 10**6} million)")
+            (budget or PixelBudget()).take(image.width, image.height, len(data))
             image.draft("RGB", (MAX_SIDE, MAX_SIDE))
-            pixels = _as_bytes(image).convert("RGBA")
+            pixels = _as_bytes(image)
+            if pixels.mode not in REDUCIBLE:
+                pixels = pixels.convert("RGBA")
             pixels.thumbnail((MAX_SIDE, MAX_SIDE))
-            return np.array(pixels)
+            return np.array(pixels.convert("RGBA"))
     except Image.UnidentifiedImageError:
         raise FormatError(f"is no PNG, JPEG or WebP that can be decoded (starts with {data[:8].tobytes()!r})") from None
     except (*DECODER_ERRORS, Image.DecompressionBombError) as error:

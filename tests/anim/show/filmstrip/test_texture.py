@@ -101,7 +101,24 @@ def test_damaged_images_are_never_a_crash() -> None:
                 continue
 
 
-def test_images_larger_than_memory_should_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(texture, "MAX_PIXELS", 50)
-    with pytest.raises(FormatError, match="has 9 × 9 pixels"):
-        decode_image(np.frombuffer(encoded(np.zeros((9, 9, 4))), np.uint8))
+def test_images_of_many_pixels_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = np.frombuffer(encoded(np.zeros((90, 90, 4))), np.uint8)
+    monkeypatch.setattr(texture, "FREE_PIXELS", 8100)
+    monkeypatch.setattr(texture, "PIXELS_PER_BYTE", 1)
+    budget = texture.PixelBudget()
+    decode_image(data, budget)
+    with pytest.raises(FormatError, match=r"has 90 × 90 pixels .*by the file's size"):
+        decode_image(data, budget)
+    monkeypatch.setattr(texture, "MAX_PIXELS", 8000)
+    with pytest.raises(FormatError, match="has 90 × 90 pixels"):
+        decode_image(data)
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB", "RGBA", "P", "LA", "1"])
+def test_reduced_images_are_the_average_of_their_pixels(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(texture, "MAX_SIDE", 4)
+    pixels = np.random.default_rng(3).integers(0, 256, (8, 8, 4))
+    data = np.frombuffer(encoded(pixels, "PNG", mode), np.uint8)
+    expected = Image.open(io.BytesIO(data.tobytes())).convert("RGBA")
+    expected.thumbnail((4, 4))
+    np.testing.assert_allclose(decode_image(data).astype(int), np.array(expected).astype(int), atol=1)
