@@ -23,6 +23,7 @@ from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
 from anim.sampling.pose import PoseSampler
+from anim.show.plots import polylines, track_selection
 from anim.skinning.analysis import collapse as collapse_analysis
 from cli.workflows import mesh_pairs
 from fixtures.broken.pieces import buffered, text
@@ -289,3 +290,24 @@ def test_skinned_meshes_share_the_poses_of_the_skeleton(
         sizes.append(len(counted))
         monkeypatch.undo()
     assert sizes[0] == sizes[1] > 0
+
+
+def test_a_plot_computes_each_curve_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the number of its components, which each ask for their color."""
+    pytest.importorskip("matplotlib")
+    (tmp_path / "in.glb").write_bytes(many.targets(20))
+    curves, speeds = (_count_calls(monkeypatch, polylines, name) for name in ("value_line", "speed_line"))
+    call("plot", tmp_path / "in.glb", tmp_path / "out.png").product()
+    assert (len(curves), len(speeds)) == (1, 1)
+
+
+def test_a_plot_of_many_tracks_prepares_those_that_it_draws(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    (tmp_path / "in.glb").write_bytes(many.channels(1000))
+    counted = _count_calls(monkeypatch, track_selection, "PlotTrack")
+    said = call("plot", tmp_path / "in.glb", tmp_path / "out.png", "--limit", "2")
+    said.product()
+    assert "drew the first 2 of 1000 tracks that move" in said.err
+    assert len(counted) == 2

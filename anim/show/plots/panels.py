@@ -20,16 +20,14 @@ from anim.show.plots.rotations import (
     NEAR_LOCK_DEG,
     RotationCurve,
     gimbal_distance_line,
-    rotation_curve,
 )
-from anim.show.plots.track_selection import PlotTrack
+from anim.show.plots.track_selection import MAX_COLORED, PlotTrack
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LABEL = 8.0  # points
 BEHIND, PALE, THIN = 4.5, 0.25, 1.1  # width and opacity of a first file's lines, width of the second's
-MAX_COLORED = 6  # components in color; the others are in the background
 TOO_DENSE, DOTS, HANDLES, RIMS = 1.5, 11, 14, 30  # px between keys, least values for each kind of mark
 MAX_RANGE_RATIO = 4.0  # times the widest range; values further apart are drawn relative to their first key
 NAME_SPACING_PX = 12.5  # px between names of components
@@ -42,7 +40,7 @@ def kinds(each: PlotTrack) -> list[str]:
     names = ["value"]
     if each.track.kind is ValueKind.ROTATION:
         names.append("angle" if each.view in (FROM_REST, COMPONENTS) else "lock")
-    if any(np.nan_to_num(polylines.speed_line(track).values).any() for track in _tracks(each)):
+    if any(np.nan_to_num(line.values).any() for line in each.speeds):
         names.append("speed")
     if each.other is not None:
         names.append("difference")
@@ -51,13 +49,13 @@ def kinds(each: PlotTrack) -> list[str]:
 
 def labels(each: PlotTrack) -> list[str]:
     """Return the names of the components drawn in color."""
-    return [each.labels[c] for c in _colored(each)]
+    return [each.labels[c] for c in each.colored]
 
 
 def _value(axes: Axes, each: PlotTrack) -> str:
     """Draw values: those of the second file over those of the first, with keys and handles of the topmost."""
     front = each.other or each.track
-    curves = [_curve(each, track) for track in _tracks(each)]
+    curves = [curve for curve in (each.curve, each.other_curve) if curve is not None]
     top = curves[-1]
     origin = _origin(each, curves[0])
     if each.other is not None:
@@ -103,7 +101,7 @@ def _lock(axes: Axes, each: PlotTrack) -> str:
 
 
 def _speed(axes: Axes, each: PlotTrack) -> str:
-    found = [polylines.speed_line(track) for track in _tracks(each)]
+    found = each.speeds
     factor, unit = _unit(each, max(float(np.nanmax(line.values)) for line in found if len(line.times)))
     _single(axes, found, factor, SPEED)
     if each.track.kind is ValueKind.ROTATION:
@@ -156,26 +154,12 @@ def _tracks(each: PlotTrack) -> list[Track]:
     return [each.track] if each.other is None else [each.track, each.other]
 
 
-def _curve(each: PlotTrack, track: Track) -> RotationCurve:
-    """A track as drawn values."""
-    if each.is_in_degrees:
-        return rotation_curve(track, view=each.view, rest=each.rest)
-    risers = polylines.step_edges(track) if track.interpolation is Interpolation.STEP else None
-    return RotationCurve(polylines.value_line(track), track.values, risers)
-
-
-def _colored(each: PlotTrack) -> list[int]:
-    """Indices of the components with the largest range."""
-    ranges = np.ptp(_curve(each, each.track).keys, axis=0)
-    return sorted(np.argsort(-ranges, kind="stable")[:MAX_COLORED].tolist())
-
-
 def _color(each: PlotTrack, component: int) -> str:
     """Red, green and blue for rotations about x, y and z; else the next color for each component by range."""
     if each.is_in_degrees:
         is_twice = len({label[0] for label in each.labels}) < len(each.labels)
         return COLORS[component if is_twice else "xyz".index(each.labels[component].lower())]
-    colored = _colored(each)
+    colored = each.colored
     return COLORS[colored.index(component)] if component in colored else HAIR
 
 
@@ -200,7 +184,7 @@ def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **l
     """Draw components in ascending order of range, those in color over the others."""
     if not len(line.times):
         return
-    colored = _colored(each)
+    colored = each.colored
     others = [c for c in range(line.values.shape[1]) if c not in colored]
     by_range = sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c]))))
     for c in (*others, *by_range):
@@ -209,7 +193,7 @@ def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **l
 
 
 def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:
-    colored = _colored(each)
+    colored = each.colored
     times, values = polylines.handles(front)
     for c in colored:
         pieces = np.concatenate(np.split(values[:, :, c], 2), axis=1)  # both keys and both handles of every segment
@@ -229,7 +213,7 @@ def _keys(axes: Axes, each: PlotTrack, times: Floats, values: Floats) -> None:
         if spacing >= TOO_DENSE:
             axes.vlines(times, low, low + 0.025 * (high - low), color=SOFT, linewidth=0.5, alpha=0.55)
         return
-    colored = _colored(each)
+    colored = each.colored
     for c in colored:
         rim = 0.6 if spacing >= RIMS else 0.0  # closer ones would cut the line into dashes
         dot = {"color": _color(each, c), "markersize": 3.6, "markeredgecolor": PAPER, "markeredgewidth": rim}
@@ -238,7 +222,7 @@ def _keys(axes: Axes, each: PlotTrack, times: Floats, values: Floats) -> None:
 
 def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
     """Write names of components at the right ends of their curves; of equal ones the first is on top."""
-    colored = _colored(each)
+    colored = each.colored
     low, high = axes.get_ylim()
     gap = NAME_SPACING_PX / panel_axes.size(axes)[1] * (high - low)
     upwards = colored[::-1]
@@ -259,6 +243,7 @@ def _single(
     """Draw one filled curve from 0, or two lines for a comparison."""
     from matplotlib.ticker import MaxNLocator
 
+    found = [polylines.keep_extremes(line) for line in found]
     top = max((float(np.nanmax(line.values)) for line in found if len(line.times)), default=0.0) * factor
     axes.set_ylim(0, top * 1.08 if top > 0 else 1)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=2, steps=list(steps)))
@@ -270,7 +255,7 @@ def _single(
 
 def _plot_lines(axes: Axes, found: list[Polyline], factor: float, color: str) -> None:
     """Draw one line, or two for a comparison: the first one wide and pale behind the other."""
-    for i, line in enumerate(found):
+    for i, line in enumerate(map(polylines.keep_extremes, found)):
         is_behind = len(found) > 1 and i == 0
         style = {"linewidth": BEHIND - 1, "alpha": PALE} if is_behind else {"linewidth": THIN}
         axes.plot(line.times, line.values[:, 0] * factor, color=color, **style)

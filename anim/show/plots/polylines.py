@@ -16,6 +16,8 @@ from anim.sampling.track import sample
 
 NUM_LINE_POINTS = 800  # of a line: one for each pixel of a wide panel
 MAX_SEGMENT_POINTS, MIN_SEGMENT_POINTS = 40, 2  # points of one piece
+DENSE_KEYS = 100_000  # over a hundred in each pixel: points between them are not seen
+DENSE_SPANS = 8 * NUM_LINE_POINTS  # of a line with more points than dense keys have
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +97,24 @@ def handles(track: Track) -> tuple[Floats, Floats]:
     return np.concatenate((leaving_t, arriving_t)), np.concatenate((leaving, arriving))
 
 
+def is_dense(track: Track) -> bool:
+    """Return whether a track has so many keys that points between them are not seen."""
+    return len(track.times) > DENSE_KEYS
+
+
+def keep_extremes(line: Polyline) -> Polyline:
+    """Return the least and largest values in short spans of a line of very many points; of fewer the line itself.
+
+    Drawn, they look the same.
+    """
+    count, width = line.values.shape
+    if count <= 4 * DENSE_KEYS:  # points at each key, as of tracks that are not dense
+        return line
+    starts = np.arange(0, count, -(-count // DENSE_SPANS))
+    ends = [part.reduceat(line.values, starts, axis=0) for part in (np.fmin, np.fmax)]  # NaN only where all are
+    return Polyline(np.repeat(line.times[starts], 2), np.stack(ends, axis=1).reshape(-1, width))
+
+
 def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
     """Times (P, m) within every segment, both ends included, and a mask (P,) of those followed by a jump."""
     steps = np.diff(track.times)
@@ -102,7 +122,9 @@ def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:
     chosen = np.flatnonzero(real) if pieces_only else np.arange(len(steps))
     straight = track.interpolation is Interpolation.LINEAR and (pieces_only or track.kind is not ValueKind.ROTATION)
     count = (
-        MIN_SEGMENT_POINTS if straight else int(np.clip(NUM_LINE_POINTS // max(len(chosen), 1), 4, MAX_SEGMENT_POINTS))
+        MIN_SEGMENT_POINTS
+        if straight or is_dense(track)
+        else int(np.clip(NUM_LINE_POINTS // max(len(chosen), 1), 4, MAX_SEGMENT_POINTS))
     )
     shares = np.linspace(0, 1, count)
     times = track.times[chosen][:, None] + steps[chosen][:, None] * shares

@@ -18,6 +18,7 @@ FLOAT32_GIMBAL_TOLERANCE_RAD = 1e-6  # rad from lock, below which float32 rotati
 NEAR_LOCK_DEG = 5.0  # rates of angles are amplified 23 times there
 REVOLUTION_DEG = 360.0
 MAX_LINE_STEP_DEG = 3.0  # between points of a line; Euler angles race near lock, where the rotation itself does not
+MIN_BLOCK, MAX_BLOCK = 64, 65_536  # vectors that are compared at once
 MAX_REFINEMENTS = 6  # halvings of the time between two points
 
 
@@ -41,7 +42,7 @@ def rotation_curve(track: Track, *, view: str, rest: Floats) -> RotationCurve:
         return RotationCurve(polylines.value_line(held), keys, polylines.step_edges(held))
     times = polylines.value_line(track).times
     values = degrees(sample(track, times), view=view, rest=rest)
-    for _ in range(MAX_REFINEMENTS):
+    for _ in range(0 if polylines.is_dense(track) else MAX_REFINEMENTS):
         coarse = np.flatnonzero(np.abs(np.diff(values, axis=0)).max(axis=1) > MAX_LINE_STEP_DEG)
         if not len(coarse):
             break
@@ -75,10 +76,23 @@ def gimbal_distance_line(track: Track, *, order: str) -> Polyline:
 def _continuous(q: Floats) -> Floats:
     """Rotation vectors (P, 3) in degrees of unit quaternions (P, 4), continuous beyond 180°."""
     vectors = np.degrees(quaternion.rotation_vector(quaternion.align_signs(q)))
-    for i in range(1, len(vectors)):
-        length = float(np.linalg.norm(vectors[i]))
-        if length > 0:
-            axis = vectors[i] / length
-            revolutions = np.rint((vectors[i - 1] @ axis - length) / REVOLUTION_DEG)
-            vectors[i] += revolutions * REVOLUTION_DEG * axis
-    return np.asarray(vectors)
+    lengths = np.sqrt(_dots(vectors, vectors))
+    axes = vectors / np.where(lengths > 0, lengths, 1.0)[:, None]
+    turned = np.zeros(len(vectors))  # degrees to add along each axis
+    at, size = 1, MIN_BLOCK
+    while at < len(vectors):
+        block = slice(at, at + size)
+        before = slice(at - 1, at - 1 + len(vectors[block]))
+        given = turned[at - 1]  # as long as it stays, all following vectors are compared at once
+        found = np.rint((_dots(vectors[before] + given * axes[before], axes[block]) - lengths[block]) / REVOLUTION_DEG)
+        found *= REVOLUTION_DEG
+        changed = np.flatnonzero(found != given)
+        used = int(changed[0]) + 1 if len(changed) else len(found)
+        turned[at : at + used] = found[:used]
+        at, size = at + used, min(2 * size, MAX_BLOCK) if used == len(found) else MIN_BLOCK
+    return np.asarray(vectors + turned[:, None] * axes)
+
+
+def _dots(a: Floats, b: Floats) -> Floats:
+    """Products (P,) of vectors (P, 3), each rounded as by `@` of two vectors."""
+    return np.asarray((a[:, None] @ b[:, :, None])[:, 0, 0])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -17,16 +19,19 @@ from anim.maths import quaternion
 from anim.measure.inspect import frame_rate
 from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
 from anim.operations.selection import Selection
-from anim.show.plots.rotations import COMPONENTS, FROM_REST
+from anim.show.plots import polylines
+from anim.show.plots.moving_tracks import are_moving
+from anim.show.plots.polylines import Polyline
+from anim.show.plots.rotations import COMPONENTS, FROM_REST, RotationCurve, rotation_curve
 
+MAX_COLORED = 6  # components in color; the others are in the background
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
-CONSTANT_TOLERANCE = 2e-5  # of the largest value; smaller changes are rounding of the exporter
 COLORS = ("color", "Color", "ColorFactor", "emissiveFactor", "attenuationColor")  # ends of pointers that name colors
 MIN_FPS = 8.0  # fps; lower rates are intervals of single poses, not frames
 MIN_GRID_FRACTION = 0.98  # least fraction of keys on a frame grid for showing frames
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class PlotTrack:
     """One track to draw.
 
@@ -51,6 +56,36 @@ class PlotTrack:
         """Return whether a rotation is drawn as angles, not as the components of its quaternion."""
         return self.track.kind is ValueKind.ROTATION and self.view != COMPONENTS
 
+    @cached_property
+    def curve(self) -> RotationCurve:
+        """The track as drawn values."""
+        return self._curve(self.track)
+
+    @cached_property
+    def other_curve(self) -> RotationCurve | None:
+        """The track of the second file as drawn values."""
+        return None if self.other is None else self._curve(self.other)
+
+    @cached_property
+    def colored(self) -> list[int]:
+        """Indices of the components with the largest range."""
+        ranges = np.ptp(self.curve.keys, axis=0)
+        return sorted(np.argsort(-ranges, kind="stable")[:MAX_COLORED].tolist())
+
+    @cached_property
+    def speeds(self) -> list[Polyline]:
+        """Speed of the track, and of that of the second file."""
+        tracks = [self.track] if self.other is None else [self.track, self.other]
+        return [polylines.keep_extremes(polylines.speed_line(track)) for track in tracks]
+
+    def _curve(self, track: Track) -> RotationCurve:
+        if self.is_in_degrees:
+            curve = rotation_curve(track, view=self.view, rest=self.rest)
+        else:
+            risers = polylines.step_edges(track) if track.interpolation is Interpolation.STEP else None
+            curve = RotationCurve(polylines.value_line(track), track.values, risers)
+        return replace(curve, line=polylines.keep_extremes(curve.line))
+
     @property
     def key(self) -> tuple[str, str, str]:
         """Key by which tracks of two files are matched."""
@@ -72,13 +107,15 @@ def select_tracks(document: Document, selection: Selection, *, limit: int, view:
     view: representation of rotations; with an order of Euler angles only rotations are selected.
     Raises NotFoundError if no track is selected.
     """
-    found = _select(document, selection, view)
+    file = _ReadFile(document, view)
+    found = file.select(selection)
     if view not in (FROM_REST, COMPONENTS):
-        found = [each for each in found if each.track.kind is ValueKind.ROTATION]
+        found = [each for each in found if each[1].kind is ValueKind.ROTATION]
     if not found:
         raise NotFoundError("no track is selected")
-    moving = [each for each in found if _is_moving(each.track)] or found
-    return TrackSelection(tuple(moving[:limit]), len(found) - len(moving), max(len(moving) - limit, 0))
+    moving = list(compress(found, are_moving([track for _, track in found]))) or found
+    shown = tuple(file.plot_track(*each) for each in moving[:limit])
+    return TrackSelection(shown, len(found) - len(moving), max(len(moving) - limit, 0))
 
 
 def compare_selection(chosen: TrackSelection, other: Document) -> tuple[TrackSelection, int]:
@@ -86,7 +123,8 @@ def compare_selection(chosen: TrackSelection, other: Document) -> tuple[TrackSel
 
     Raises NotFoundError if there is no match.
     """
-    partners = {each.key: each for each in reversed(_select(other, Selection(), FROM_REST))}
+    file = _ReadFile(other, FROM_REST)
+    partners = {each.key: each for each in (file.plot_track(*found) for found in reversed(file.select(Selection())))}
     shown = tuple(_with(each, partners.get(each.key)) for each in chosen.shown)
     alone = sum(each.other is None for each in shown)
     if alone == len(shown):
@@ -110,23 +148,34 @@ def _with(each: PlotTrack, partner: PlotTrack | None) -> PlotTrack:
     )
 
 
-def _select(document: Document, selection: Selection, view: str) -> list[PlotTrack]:
-    clips, skeleton = reader.clips(document), reader.skeleton(document)
-    targets = _morph_targets(document)
-    found = []
-    for number in selection.chosen_clips([clip.name for clip in clips]):
-        clip = clips[number]
-        span, fps = (clip.start, clip.end), _rate(clip)  # once per clip: a search over all tracks
-        for i in sorted(selection.chosen_tracks(clip, skeleton)):
-            track = _align(clip.tracks[i])
-            labels = _labels(track, targets, view)
-            name, target = (
-                _printable_name(reader.clip_name(clip.name, number)),
-                _printable_name(_target(track, skeleton)),
-            )
-            rest = IDENTITY if track.node is None else skeleton.rotation[track.node]
-            found.append(PlotTrack(name, target, track, labels, *span, fps, None, view, rest))
-    return found
+class _ReadFile:
+    """Clips and skeleton of a file. view: representation of rotations."""
+
+    def __init__(self, document: Document, view: str) -> None:
+        self._clips, self._skeleton = reader.clips(document), reader.skeleton(document)
+        self._targets = _morph_targets(document)
+        self._view = view
+        self._spans: dict[int, tuple[float, float, float | None]] = {}
+
+    def select(self, selection: Selection) -> list[tuple[int, Track]]:
+        """Return the selected tracks in the file's order, with the indices of their clips."""
+        return [
+            (number, self._clips[number].tracks[i])
+            for number in selection.chosen_clips([clip.name for clip in self._clips])
+            for i in sorted(selection.chosen_tracks(self._clips[number], self._skeleton))
+        ]
+
+    def plot_track(self, number: int, track: Track) -> PlotTrack:
+        """Return a track of a clip, ready to be drawn."""
+        clip = self._clips[number]
+        if number not in self._spans:  # a search over all tracks of the clip
+            self._spans[number] = clip.start, clip.end, _rate(clip)
+        start, end, fps = self._spans[number]
+        name = _printable_name(reader.clip_name(clip.name, number))
+        target = _printable_name(_target(track, self._skeleton))
+        rest = IDENTITY if track.node is None else self._skeleton.rotation[track.node]
+        labels = _labels(track, self._targets, self._view)
+        return PlotTrack(name, target, _align(track), labels, start, end, fps, None, self._view, rest)
 
 
 def _align(track: Track) -> Track:
@@ -227,14 +276,3 @@ def _shorten(names: Sequence[str]) -> tuple[str, ...]:
     cut = max(first[:same].rfind(mark) for mark in "_.-/ ") + 1
     short = [name[cut:] for name in names]
     return tuple(names) if any(not name or name.isdecimal() for name in short) else tuple(short)
-
-
-def _is_moving(track: Track) -> bool:
-    values = track.values
-    tangents = (track.in_tangents, track.out_tangents)
-    tolerance = CONSTANT_TOLERANCE * (
-        1 if track.kind is ValueKind.ROTATION else max(float(np.abs(values).max()), 1e-30)
-    )
-    return bool((np.abs(values - values[0]) > tolerance).any()) or any(
-        each is not None and len(values) > 1 and bool(np.abs(each).max() > tolerance) for each in tangents
-    )

@@ -115,3 +115,25 @@ def test_names_keep_apart(places: list[float], expected: list[float]) -> None:
 
 def test_short_numbers() -> None:
     assert [format_number(x) for x in (0.0, 1e-4, 123456.0, -2.5, 1 / 3)] == ["0", "0.0001", "123000", "−2.5", "0.333"]
+
+
+def test_a_line_of_very_many_points_keeps_its_extremes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(polylines, "DENSE_KEYS", 1000)
+    values = np.random.default_rng(1).normal(size=(50_001, 2))
+    values[40_000:40_030] = np.nan
+    line = polylines.Polyline(np.linspace(0, 1, 50_001), values)
+    short = polylines.keep_extremes(line)
+    assert len(short.times) <= 2 * polylines.DENSE_SPANS
+    assert (np.diff(short.times) >= 0).all()
+    for extreme in (np.nanmin, np.nanmax):
+        np.testing.assert_array_equal(extreme(short.values, axis=0), extreme(values, axis=0))
+    assert np.isnan(short.values).any()
+    few = polylines.Polyline(line.times[:4000], values[:4000])
+    assert polylines.keep_extremes(few) is few
+
+
+def test_dense_keys_have_no_points_between_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    track = clips.track("rotation", np.arange(20.0), about("z", np.arange(20.0)))
+    many = len(polylines.value_line(track).times)
+    monkeypatch.setattr(polylines, "DENSE_KEYS", 10)
+    assert many > len(polylines.value_line(track).times) == 2 * 19

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.gltf.authoring import build_document
+from anim.maths import quaternion
 from anim.model import Clip, Interpolation
 from anim.operations.selection import Selection
 from anim.show.plots.rotations import COMPONENTS, FROM_REST, degrees, gimbal_distance_line, rotation_curve
@@ -86,3 +87,21 @@ def test_splines_and_poses_can_be_drawn_in_degrees() -> None:
         assert _words(view, spline)
         assert _words(view, track("rotation", [0], about("x", [20])))
         assert _words(view, track("rotation", [0, 1, 2], about("x", [0, 20, 90]), STEP))
+
+
+def test_vectors_are_continuous_as_by_one_after_the_other() -> None:
+    """Blocks are compared at once as long as the number of turns stays."""
+    random = np.random.default_rng(5)
+    steady = np.cumsum(random.normal(size=700) * 0.3)
+    quarters = np.arange(300) * np.pi / 4
+    axis = np.array([0.6, 0, 0.8])
+    for q in (
+        *(np.concatenate((np.sin(a)[:, None] * axis, np.cos(a)[:, None]), axis=1) for a in (steady, quarters)),
+        Rotation.random(300, random).as_quat(),
+    ):
+        expected = np.degrees(quaternion.rotation_vector(quaternion.align_signs(q)))
+        for i in range(1, len(expected)):
+            if (length := float(np.linalg.norm(expected[i]))) > 0:
+                along = expected[i] / length
+                expected[i] += np.rint((expected[i - 1] @ along - length) / 360) * 360 * along
+        np.testing.assert_allclose(degrees(q, view=FROM_REST, rest=NONE), expected, atol=1e-9)
