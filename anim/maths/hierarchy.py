@@ -101,17 +101,18 @@ def _by_level(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Com
 
 def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose, found: Floats) -> None:
     """Products of D levels in 2 √D steps: first in all sections of √D levels at once, then of one after the other."""
-    height = math.isqrt(len(levels))
-    sections = [levels[i : i + height] for i in range(0, len(levels), height)]
+    height, order = math.isqrt(len(levels)), np.concatenate(levels)
+    sizes = np.fromiter(map(len, levels), np.int64, len(levels))
+    step = np.repeat(np.arange(len(levels)) % height, sizes)  # of each node: its level in its section
+    by_step = np.split(order[np.argsort(step, kind="stable")], np.cumsum(np.bincount(step))[:-1])
+    sections = np.split(order, np.cumsum(sizes)[height - 1 : -1 : height])
     if found is not local:
         found[:] = local
     above = parents.copy()  # of each node: the parent of its section's first node above it
-    for step in range(1, height):
-        nodes = np.concatenate([section[step] for section in sections if step < len(section)])
+    for nodes in by_step[1:]:
         found[nodes] = compose(found[parents[nodes]], local[nodes])
         above[nodes] = above[parents[nodes]]
-    for section in sections[1:]:
-        nodes = np.concatenate(section)
+    for nodes in sections[1:]:
         found[nodes] = compose(found[above[nodes]], found[nodes])
 
 

@@ -98,9 +98,9 @@ class _Nodes:
     def __init__(self, old: Skeleton, new: Skeleton) -> None:
         self._old, self._new = old, new
         self._children = _children(old), _children(new)
-        self.found = match_by_letters(old.names, new.names)
+        self.found: list[int] = match_by_letters(old.names, new.names).tolist()
         self._match_paths()
-        self._taken = set(self.found[self.found >= 0].tolist())
+        self._taken = {node for node in self.found if node >= 0}
         self._renamed = not (match_by_name(old.names, new.names) >= 0).any()
 
     def _match_paths(self) -> None:
@@ -121,10 +121,10 @@ class _Nodes:
             if len(one) == len(other):
                 self._join(one.tolist(), other.tolist())
         self._join_children(-1, -1)
-        for level in self._old.levels():
-            for parent in level[self.found[level] >= 0].tolist():
-                self._join_children(parent, int(self.found[parent]))
-        return self.found
+        for parent in np.concatenate([np.empty(0, np.int64), *self._old.levels()]).tolist():
+            if self.found[parent] >= 0 and parent in self._children[0]:
+                self._join_children(parent, self.found[parent])
+        return np.array(self.found, np.int64)
 
     def _join_children(self, parent: int, partner: int) -> None:
         """Match the remaining children of two nodes in order if they are equally many: parents first."""
@@ -134,7 +134,7 @@ class _Nodes:
         inner, others_inner = [i for i in one if i in old_children], [i for i in other if i in new_children]
         if len(inner) == len(others_inner):
             self._join(inner, others_inner)
-            self._join_equal([i for i in one if i not in inner], [i for i in other if i not in others_inner])
+            self._join_equal([i for i in one if i not in old_children], [i for i in other if i not in new_children])
         else:
             self._join_equal(one, other)
 
@@ -162,12 +162,11 @@ def _path_ids(skeleton: Skeleton, known: dict[tuple[int, str], int]) -> list[int
 
     known: indices by the parent's index, −1 for none, and the name; added to.
     """
-    found = [-1] * len(skeleton)
-    for level in skeleton.levels():
-        for node in level.tolist():
-            parent = int(skeleton.parents[node])
-            key = (found[parent] if parent >= 0 else -1, skeleton.names[node])
-            found[node] = known.setdefault(key, len(known))
+    found, parents = [-1] * len(skeleton), skeleton.parents.tolist()
+    for node in np.concatenate([np.empty(0, np.int64), *skeleton.levels()]).tolist():
+        parent = parents[node]
+        key = (found[parent] if parent >= 0 else -1, skeleton.names[node])
+        found[node] = known.setdefault(key, len(known))
     return found
 
 

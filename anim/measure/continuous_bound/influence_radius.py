@@ -59,7 +59,8 @@ def influence_radius(part: PointGroups) -> InfluenceRadius | None:
         return None
     surface, nodes = part.surface, part.old.nodes[part.used]
     arms = _arms(part, surface.points, part.old.bind, 1.0)
-    apart = _arms(part, surface.points, part.new.bind - part.old.bind, 1.0)
+    is_same = part.new is part.old
+    apart = np.zeros_like(arms) if is_same else _arms(part, surface.points, part.new.bind - part.old.bind, 1.0)
     morphing = _morphing(part, part.old, part.new) if len(surface.targets) else None
     return InfluenceRadius(nodes, arms, apart, np.full(len(nodes), part.fraction), part.reach, morphing)
 

@@ -77,9 +77,12 @@ def statistics(
     for each in ruler.blocks(before, after, times, player=player) if block is None else [block]:
         angle = max(angle, _rotation_errors(ruler, each), key=lambda peak: peak.size)
         weight = max(weight, _weighted(ruler, each), key=lambda peak: peak.size)
-    every = np.concatenate(found) if found else np.zeros(1)
+    found = [each for each in found if len(each)] or [np.zeros(1)]
+    every = found.pop() if len(found) == 1 else np.concatenate(found)
+    found.clear()
     speed = speed_error(ruler, before, after, player=player, fps=fps)
-    return Statistics(float(every.mean()), _percentile(every, 0.99), angle, speed, weight)
+    mean = float(every.mean())
+    return Statistics(mean, _percentile(every, 0.99), angle, speed, weight)
 
 
 def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Peak:
@@ -127,9 +130,10 @@ def _is_shell(part: PointGroups) -> bool:
 
 
 def _percentile(values: Floats, share: float) -> float:
-    """The value below which this fraction of all is."""
+    """The value below which this fraction of all is. values: reordered."""
     place = min(int(np.ceil(share * len(values))), len(values)) - 1
-    return float(np.partition(values, place)[place])
+    values.partition(place)
+    return float(values[place])
 
 
 def _rotation_errors(ruler: ErrorMetric, block: Block) -> Peak:
