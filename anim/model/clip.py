@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,6 +22,9 @@ class Clip:
 
     name: str
     tracks: tuple[Track, ...]
+    _time_axes: tuple[TimeAxis, ...] | None = field(
+        init=False, repr=False, compare=False, default=None
+    )  # once asked for
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -38,7 +41,9 @@ class Clip:
     @property
     def time_axes(self) -> tuple[TimeAxis, ...]:
         """Distinct time axes, in the order of the tracks."""
-        return tuple(dict.fromkeys([track.time_axis for track in self.tracks]))
+        if self._time_axes is None:  # operations ask for the end at every track
+            object.__setattr__(self, "_time_axes", tuple(dict.fromkeys([track.time_axis for track in self.tracks])))
+        return self._time_axes or ()
 
     @property
     def key_times(self) -> Floats:

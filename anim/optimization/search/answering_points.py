@@ -10,6 +10,7 @@ from anim.arrays import Floats, Ints
 from anim.maths.hierarchy import find_subtrees
 from anim.measure.error.point_matrix import CARRIED, PointMatrix
 
+MIN_OVERLAP = 16  # times that a point answers for a node, on average, from which on maxima of ranges are combined
 MAX_CACHED = 10_000_000  # indices of points that are cached; those of further nodes are found again each time
 
 
@@ -24,6 +25,7 @@ class AnsweringPoints:
         entries = self._joint.reshape(-1)
         order = np.argsort(entries, kind="stable")
         self._sorted, self._point = entries[order], order // max(self._joint.shape[1], 1)
+        self._is_nested = self._joint.shape[1] == 1 and bool((self._weight > CARRIED).all())  # a range for each node
         self._cached: dict[int, Ints] = {}
         self._room = MAX_CACHED
 
@@ -39,6 +41,11 @@ class AnsweringPoints:
 
     def largest(self, values: Floats, nodes: Sequence[int]) -> Floats:
         """Return the largest of the values (P,), 0 or more, at the points of each node."""
+        if self._is_nested:
+            chosen = np.array(nodes, np.int64)
+            starts, ends = np.searchsorted(self._sorted, (self._first[chosen], self._end[chosen]))
+            if (ends - starts).sum() > MIN_OVERLAP * len(values):
+                return _range_maxima(values[self._point], starts, ends)
         return np.array([values[self.of(node)].max(initial=0.0) for node in nodes], np.float64)
 
     def _find(self, first: int, end: int) -> Ints:
@@ -49,3 +56,15 @@ class AnsweringPoints:
         joint = self._joint[near]
         share = (self._weight[near] * ((first <= joint) & (joint < end))).sum(axis=1)
         return np.asarray(near[share > CARRIED if (share > CARRIED).any() else share > 0])
+
+
+def _range_maxima(values: Floats, starts: Ints, ends: Ints) -> Floats:
+    """The largest of the values (P,), 0 or more, in each range: of two that overlap, each of a power of two values."""
+    found, lengths = np.zeros(len(starts)), ends - starts
+    width = 1
+    while len(some := np.flatnonzero(lengths >= width)):
+        fits = some[lengths[some] < 2 * width]
+        found[fits] = np.maximum(values[starts[fits]], values[ends[fits] - width])
+        values = np.maximum(values[:-width], values[width:])
+        width *= 2
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -57,3 +58,12 @@ def test_copies_are_equal_and_read_only(copied: Any) -> None:
     assert found == walk
     assert not found.tracks[0].values.flags.writeable
     assert not found.tracks[0].times.flags.writeable
+
+
+def test_time_axes_are_found_once() -> None:
+    """Operations ask for the end of the clip at every track: a search over all tracks each time would be quadratic."""
+    found = clip(track("rotation", [0, 1], [[0, 0, 0, 1]] * 2, node=1))
+    assert found.time_axes is found.time_axes
+    assert Clip("", ()).time_axes == ()
+    assert replace(found, tracks=()).time_axes == ()
+    assert pickle.loads(pickle.dumps(found)) == found

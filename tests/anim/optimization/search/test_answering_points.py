@@ -48,6 +48,19 @@ def test_points_of_every_node(seed: int, width: int, cached: int, monkeypatch: p
         assert [sorted(found.of(node).tolist()) for node in range(NODES)] == expected
         most = [values[each].max(initial=0) for each in expected]
         assert found.largest(values, range(NODES)).tolist() == most
+        with monkeypatch.context() as patched:
+            patched.setattr(answering_points, "MIN_OVERLAP", 0)
+            assert found.largest(values, range(NODES)).tolist() == most
+
+
+def test_maxima_of_nested_points_take_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a chain every point answers for all nodes above it: not one point after the other."""
+    count = 1000
+    monkeypatch.setattr(AnsweringPoints, "_find", None)
+    points = PointMatrix(np.arange(count), np.arange(count)[:, None], np.ones((count, 1, 4)))
+    values = np.random.default_rng(0).random(count)
+    found = AnsweringPoints(points, np.arange(-1, count - 1)).largest(values, range(count))
+    assert found.tolist() == np.maximum.accumulate(values[::-1])[::-1].tolist()
 
 
 def test_no_points() -> None:
