@@ -23,6 +23,7 @@ CHUNK_BYTES = 1 << 23  # approximate size of positions in a chunk; never less th
 PACKED_BYTES = 1 << 22  # approximate size of a chunk's matrices and morphed vertices
 MAX_BLOCKS = 32  # of LANES frames in a chunk; their poses take memory too
 MIN_VERTICES = 4096  # per thread
+MAX_VERTICES_ALONE = 4096  # of all frames: to start threads for fewer takes longer than to skin them
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,10 @@ class ChunkPipeline:
         While the caller uses one chunk the next is skinned, and the poses of the one after it are sampled.
         """
         sampler, step = PoseSampler(self.skeleton, clip), self._frames_per_chunk()
+        if len(times) <= step and len(times) * self.vertices <= MAX_VERTICES_ALONE:
+            yield self._finish(0, self._start(sampler.posed(times), None))
+            progress(len(times))
+            return
         with ThreadPoolExecutor(self.threads, thread_name_prefix="skinning") as pool:
             spans = (times[low : low + step] for low in range(0, len(times), step))
             started = (self._start(sampler.posed(span), pool) for span in spans)
@@ -59,11 +64,17 @@ class ChunkPipeline:
         blocks = min(CHUNK_BYTES // (12 * self.vertices * LANES), PACKED_BYTES // (packed * LANES), MAX_BLOCKS)
         return LANES * max(blocks, 1)
 
-    def _start(self, frames: PosedSkeleton, pool: ThreadPoolExecutor) -> _PendingChunk:
+    def _start(self, frames: PosedSkeleton, pool: ThreadPoolExecutor | None) -> _PendingChunk:
+        """Return a chunk that is skinned by the pool, or that is skinned already."""
         shape = (len(frames.times), self.vertices, 3)
         wanted = (True, self.normals, self.tangents)
         whole = OutputSlice(0, *(np.empty(shape, np.float32) if each else NO_OUTPUT for each in wanted))
-        return _PendingChunk(frames, whole, [pool.submit(_submit, jobs, whole) for jobs in self._thread_jobs(frames)])
+        shares = self._thread_jobs(frames)
+        if pool is not None:
+            return _PendingChunk(frames, whole, [pool.submit(_submit, jobs, whole) for jobs in shares])
+        for jobs in shares:
+            _submit(jobs, whole)
+        return _PendingChunk(frames, whole, [])
 
     def _thread_jobs(self, frames: PosedSkeleton) -> list[list[Job]]:
         """Return the jobs of each thread: vertices of large layers are divided, in blocks of frames."""

@@ -11,6 +11,7 @@ import typer
 
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
+from anim.measure.equal_clips import first_equal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.skinning.bake import SPACES, bakeable_instances
@@ -151,8 +152,10 @@ def command(
         if not rigid and not keeps_nodes(ending) and bakeable_instances(scene, nodes=nodes):
             bake_notes.left_out_note(scene, nodes, reporter)
         run = BakeRun(source, scene, options, files, reporter)
-        for job in jobs:
-            run.bake(job, groups[job.group][1], Clip("", ()) if job.clip is None else clips[job.clip])
+        played = [Clip("", ()) if job.clip is None else clips[job.clip] for job in jobs]
+        first = first_equal([(each,) for each in played]) if len(jobs) > 1 else [-1]
+        for job, each, n in zip(jobs, played, first, strict=True):
+            run.bake(job, groups[job.group][1], each, first=n)
             if len(jobs) > 1:
                 reporter.verbose_info(f"  {summarize_files(run.files[-1:], method.value)}")
     report_notes(run.files, reporter)

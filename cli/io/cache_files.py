@@ -113,7 +113,8 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
             f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
             help="convert-cache --at takes one of them",
         )
-    with tempfile.TemporaryDirectory() as away:
+    with ExitStack() as stack:
+        away = stack.enter_context(tempfile.TemporaryDirectory()) if is_pipe or dry_run else ""
         staged = cache_folders.outputs(path, away, dry_run=dry_run)
         try:
             written = registry.writer_for(ending)(cache, staged, writing)

@@ -13,7 +13,9 @@ FORBIDDEN = frozenset('/\\:*?"<>|')  # invalid in names on some file systems
 RESERVED = frozenset(("con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))))
 MAX_NAME_BYTES = 100  # of 255 in most file systems: the pattern may have several, and words around them
 OF_PATHS = ("path", "folder", "name", "stem")  # of names that follow from an input's
+_is_plain = re.compile(r"[A-Za-z0-9_-]*").fullmatch  # most names, of which nothing is replaced
 _PLACEHOLDER = r"\{([A-Za-z_]\w*)\}"
+_replace = re.compile(_PLACEHOLDER).sub
 
 
 def check_placeholders(output: str, known: Sequence[str] = ()) -> None:
@@ -61,11 +63,13 @@ def fixed_folder(output: str) -> str:
 
 
 def _filled(output: str, values: Mapping[str, str]) -> str:
-    return re.sub(_PLACEHOLDER, lambda match: values.get(match[1], match[0]), output)
+    return _replace(lambda match: values.get(match[1], match[0]), output)
 
 
 def _plain(name: str) -> str:
     """The name as a part of a file name on every system; empty if none of it can be one."""
+    if _is_plain(name) and len(name) <= MAX_NAME_BYTES and name.casefold() not in RESERVED:
+        return name
     plain = "".join(c if _is_allowed(c) else "_" for c in name[:MAX_NAME_BYTES]).strip(". ")
     short = plain.encode()[:MAX_NAME_BYTES].decode(errors="ignore").strip(". ")
     return f"_{short}" if short.split(".")[0].strip().casefold() in RESERVED else short

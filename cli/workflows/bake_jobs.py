@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from anim.model import Scene
 from anim.skinning.bake import bakeable_instances
 from cli.errors import UsageError
-from cli.io import cache_files, output_names
+from cli.io import cache_files, documents, output_names
 
 PLACEHOLDERS = ("mesh", "clip")
 
@@ -45,6 +46,28 @@ def bake_jobs(output: str, ending: str, groups: Sequence[MeshGroup], clips: Sequ
     rows = [{"mesh": groups[i][0], "clip": name} for i, name, _ in pairs]
     by_clip = "{clip}" in output
     files = output_names.expand(output, rows, [(clip or 0) if by_clip else i for i, _, clip in pairs])
-    for file in files if len(files) > 1 or "{" in output else ():
-        cache_files.check(file, ending, placeholders=None)
+    if len(files) > 1 or "{" in output:
+        _check_files(files, ending)
     return [BakeJob(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
+
+
+def _check_files(files: Sequence[str], ending: str) -> None:
+    """Raise UsageError or OutputError for a file that can't be written; of new ones the first of each folder tells."""
+    sound: set[tuple[str, str]] = set()  # folders and file extensions of new files
+    for file in files:
+        key = os.path.dirname(file), os.path.splitext(file)[1]
+        is_new = bool(file) and file != documents.PIPE and _is_missing(file)
+        if not (is_new and key in sound):
+            cache_files.check(file, ending, placeholders=None)
+        if is_new:
+            sound.add(key)
+
+
+def _is_missing(file: str) -> bool:
+    try:
+        os.lstat(file)
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError):  # an invalid name
+        return False
+    return False

@@ -85,29 +85,34 @@ class BakeRun:
         self._source, self._scene, self._options = source, scene, options
         self._file_options, self._reporter = file_options, reporter
         self._group: tuple[int, GroupBaker] | None = None
+        self._inbetween: dict[tuple[int, int], InbetweenError] = {}  # by group and first equal clip
         self._inbetween_errors: list[tuple[str, InbetweenError]] = []
         self._deviations: list[tuple[str, Deviation]] = []
         self._uneven_joints: set[int] = set()
 
-    def bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> None:
+    def bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip, *, first: int = -1) -> None:
         """Bake a clip into a file. nodes: of the meshes in the job's group, None for all.
 
+        first: number of the first job with an equal clip, whose errors are those of this one; −1 if unknown.
         An error names the clip, and the files that were written before.
         """
         try:
-            self._bake(job, nodes, clip)
+            self._bake(job, nodes, clip, first)
         except BaseException as error:
             if job.clip is not None and isinstance(error, (FormatError, UnsupportedError, RangeError)):
                 error.at(reader.clip_label(clip.name, job.clip))
             report_written(self.files, self._reporter, dry_run=self._file_options.dry_run)
             raise
 
-    def _bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> None:
+    def _bake(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip, first: int) -> None:
         group = self._baker(job.group, nodes)
         times, label = self._options.times(clip), reader.clip_label(clip.name, job.clip or 0)
         if group.scales is not None:
             self._uneven_joints.update(group.scales.joints(clip, times))
-        self._inbetween_errors.append((label, group.inbetween.largest_error(clip, times)))
+        known = self._inbetween.get((job.group, first)) if first >= 0 else None
+        found = group.inbetween.largest_error(clip, times) if known is None else known
+        self._inbetween[job.group, first] = found
+        self._inbetween_errors.append((label, found))
         progress = Progress(PurePath(job.file).name, len(times), shown=not self._reporter.quiet)
         measured = None
         if group.linear is not None:

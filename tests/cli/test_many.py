@@ -24,7 +24,10 @@ from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
 from anim.sampling.pose import PoseSampler
 from anim.show.plots import polylines, track_selection
+from anim.skinning import chunk_pipeline
 from anim.skinning.analysis import collapse as collapse_analysis
+from anim.skinning.analysis.inbetween_error import InbetweenMetric
+from cli.io import documents
 from cli.workflows import mesh_pairs
 from fixtures.broken.pieces import buffered, text
 from tests import many
@@ -311,3 +314,44 @@ def test_a_plot_of_many_tracks_prepares_those_that_it_draws(
     said.product()
     assert "drew the first 2 of 1000 tracks that move" in said.err
     assert len(counted) == 2
+
+
+def test_files_of_many_clips_are_checked_by_their_folder(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that are there already are checked one by one."""
+    (tmp_path / "in.glb").write_bytes(morphing_clips(CLIPS))
+    (tmp_path / "c7.npz").mkdir()
+    counted = _count_calls(monkeypatch, documents, "check_file")
+    assert "c7.npz: is a folder" in refusal(call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz"), 2)
+    assert len(counted) == 3  # the pattern, c0, c7
+    (tmp_path / "c7.npz").rmdir()
+    (tmp_path / "c8.npz").write_bytes(b"")
+    counted.clear()
+    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz").product()
+    assert len(counted) == 3
+    assert len(list(tmp_path.glob("c*.npz"))) == CLIPS
+
+
+def test_small_bakes_start_no_threads_and_measure_equal_clips_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(morphing_clips(5))
+    measured = _count_calls(monkeypatch, InbetweenMetric, "largest_error")
+    pools = _count_calls(monkeypatch, chunk_pipeline, "ThreadPoolExecutor")
+    run = call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2")
+    run.product()
+    assert "(5 clips are affected)" in run.err
+    assert (len(measured), len(pools)) == (1, 0)
+    alone = [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)]
+    monkeypatch.setattr(chunk_pipeline, "MAX_VERTICES_ALONE", 0)
+    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2").product()
+    assert len(pools) > 0
+    assert [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)] == alone
+
+
+def morphing_clips(count: int) -> bytes:
+    """Equal clips of a node with a morphing mesh, which is baked."""
+    document = json.loads(many.clips_equal(count)[20:].rstrip(b"\0 "))
+    targets = {**many.MESH["primitives"][0], "targets": [{"POSITION": 2}]}
+    return text({**document, "meshes": [{"primitives": [targets], "weights": [0.5]}]})
