@@ -8,7 +8,12 @@ import pytest
 
 from anim.curves.fitting import stacked_keys
 from anim.exchange.euler import from_euler
+from anim.exchange.euler.baked_keys import curves_of
+from anim.exchange.euler.convention import PartialConvention
+from anim.exchange.euler.motion import Unit
+from anim.exchange.formats import csv_reader, json_reader
 from anim.maths import euler
+from anim.maths.euler import AxesConvention
 from tests import many
 from tests.cli.conftest import Call
 
@@ -39,3 +44,14 @@ def test_curves_of_many_nodes_are_fitted_at_once(
     assert 0 < len(fits) < 5
     assert not alone
     assert 0 < len(distances) <= 12
+
+
+def test_columns_and_curves_with_equal_times_share_a_time_axis() -> None:
+    """Of a column with a hole, and of a curve with other times, there is a second one."""
+    intrinsic = PartialConvention("XYZ", AxesConvention.INTRINSIC, Unit.RAD)
+    made = csv_reader.read(b"time,a.rx,a.ry,b.tx,b.ty\n0,1,2,3,4\n1,5,6,,7\n2,5,6, 8 ,7\n", intrinsic)
+    curves = [curve for node in made.nodes for curve in curves_of(node)]
+    assert len({curve.time_axis for curve in curves}) == 2
+    assert sorted(curve.values.tolist() for curve in curves) == [[1, 5, 5], [2, 6, 6], [3, 8], [4, 7, 7]]
+    parsed = json_reader.read(many.json_curves(50), PartialConvention())
+    assert len({curve.time_axis for node in parsed.nodes for curve in curves_of(node)}) == 1

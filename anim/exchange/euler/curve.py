@@ -68,15 +68,16 @@ class Curve:
     out_weights: Floats | None = None
 
     def __post_init__(self) -> None:
-        set_field = object.__setattr__
-        for name in ("values", *HANDLES):
+        shape = str(len(self.time_axis))
+        object.__setattr__(self, "values", arrays.as_floats(self.values, shape, name="values"))
+        arrays.check_shape(self.modes, shape, name="modes")
+        for name in HANDLES:
             given = getattr(self, name)
             if given is not None:
-                set_field(self, name, arrays.as_floats(given, str(len(self.times)), name=name))
-            if given is not None and name in WEIGHTS and not ((given >= 0) & (given <= 1)).all():
-                raise RangeError(f"{name} go from {given.min():g} to {given.max():g} (expected shares, 0 … 1)")
-        arrays.check_shape(self.modes, str(len(self.times)), name="modes")
-        if (self.modes == Mode.CUBIC).any() and (self.in_tangents is None or self.out_tangents is None):
+                object.__setattr__(self, name, arrays.as_floats(given, shape, name=name))
+                if name in WEIGHTS and not ((given >= 0) & (given <= 1)).all():
+                    raise RangeError(f"{name} go from {given.min():g} to {given.max():g} (expected shares, 0 … 1)")
+        if (self.in_tangents is None or self.out_tangents is None) and Mode.CUBIC in self.modes.tobytes():
             raise ShapeError("a cubic curve lacks tangents")
 
     @property

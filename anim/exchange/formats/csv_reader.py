@@ -26,7 +26,6 @@ frames form `# interpolation=step` makes all of them steps.
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -43,23 +42,45 @@ from anim.exchange.euler.curve import DEFAULT_WEIGHT, MODES, Curve, Mode, unifor
 from anim.exchange.euler.motion import Convention, EulerMotion
 from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
 from anim.exchange.formats.node_builder import KINDS, MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
-from anim.exchange.formats.text import check_times, decode_text, error_at, parse_cell, parse_number
+from anim.exchange.formats.text import (
+    DIGIT_SEPARATOR,
+    MAX_NUMBER,
+    check_times,
+    decode_text,
+    error_at,
+    parse_cell,
+    parse_number,
+)
 from anim.model import TimeAxis
 
 __all__ = ["read", "write"]
 KeyRow = tuple[int, dict[str, str]]  # line, cells by column
+LINE = re.compile(r"[^\n]*\n|[^\n]+")  # io.StringIO takes four bytes a character
 
 
 @dataclass(slots=True)
 class _File:
-    """Content of a CSV before its values: comments with their lines, nodes, the header; and the rows."""
+    """Content of a CSV before its values: comments with their lines, nodes, the header; and the rows.
+
+    rows: line, and cells or, in the frames form, their numbers (C,) if all of them are.
+    """
 
     words: dict[str, str] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
     nodes: list[tuple[int, list[str]]] = field(default_factory=list)
     header: list[str] = field(default_factory=list)
     header_line: int = 1
-    rows: list[tuple[int, list[str]]] = field(default_factory=list)
+    rows: list[tuple[int, list[str] | Floats]] = field(default_factory=list)
+
+    @property
+    def has_frames(self) -> bool:
+        """True for a row per time, false for a row per key."""
+        return self.header[:1] == ["time"]
+
+    @property
+    def text_rows(self) -> list[tuple[int, list[str]]]:
+        """Rows that are not numbers alone."""
+        return [(line, cells) for line, cells in self.rows if isinstance(cells, list)]
 
     def hear(self, line: int, comment: str) -> None:
         """Parse the words "key=value" of a comment."""
@@ -89,7 +110,7 @@ def read(data: bytes, options: PartialConvention) -> EulerMotion:
     for line, cells in file.nodes:
         drafts.describe(line, cells)
     later, notes = shift_to_zero(_times(file))
-    if tuple(file.header[:1]) == ("time",):
+    if file.has_frames:
         _read_frames(file, drafts, later)
     elif set(KEY_COLUMNS) <= set(file.header):
         _read_keys(file, drafts, later)
@@ -140,9 +161,13 @@ class _NodeBuilders:
 
 def _parse(data: bytes) -> _File:
     file = _File()
-    rows = csv.reader(io.StringIO(decode_text(data)), strict=True)
+    rows = csv.reader((found[0] for found in LINE.finditer(decode_text(data))), strict=True)
     try:
         for cells in rows:
+            numbers = _numbers(cells) if file.has_frames and len(cells) == len(file.header) else None
+            if numbers is not None:
+                file.rows.append((rows.line_num, numbers))
+                continue
             cells = [cell.strip() for cell in cells]
             if not any(cells):
                 continue
@@ -170,29 +195,71 @@ def _parse(data: bytes) -> _File:
     return file
 
 
+def _numbers(cells: list[str]) -> Floats | None:
+    """The numbers of a row; None if not all cells are numbers, as `text.parse_number` has it."""
+    try:
+        numbers = np.array([*map(float, cells)])
+    except ValueError:
+        return None
+    is_valid = np.abs(numbers).max() <= MAX_NUMBER  # False for NaN
+    return numbers if is_valid and DIGIT_SEPARATOR not in "".join(cells) else None
+
+
 def _times(file: _File) -> Iterator[float]:
     """All numeric key times."""
     if "time" in file.header:
         column = file.header.index("time")
-        found = (parse_number(cells[column]) for _, cells in file.rows)
-        yield from (time for time in found if time is not None)
+        for _, cells in file.rows:
+            time = parse_number(cells[column]) if isinstance(cells, list) else float(cells[column])
+            if time is not None:
+                yield time
 
 
 def _read_frames(file: _File, drafts: _NodeBuilders, later: float) -> None:
     mode = MODES.get(file.words.get("interpolation", "linear"), Mode.CUBIC)
     if mode is Mode.CUBIC:
         raise FormatError(f"interpolation is '{file.words['interpolation']}' (frames have no tangents: step or linear)")
-    times = np.array([parse_cell(cells[0], line, "time") for line, cells in file.rows])
+    faults = _faults(file)
+    if 0 in faults:
+        parse_cell(*faults[0], "time")
+    columns = np.array([_row_numbers(cells) for _, cells in file.rows]).T.copy()
+    times = columns[0]
     check_times(times, [line for line, _ in file.rows])
-    times = times + later
+    times, axes = times + later, dict[bytes, TimeAxis]()
+    is_there = ~np.isnan(columns)
+    is_full = is_there.all(axis=1).tolist()
     for column, title in enumerate(file.header[1:], 1):
         name, _, channel = title.rpartition(".")
         draft, slot = drafts.channel(name, channel, file.header_line)
-        there = [i for i, (_, cells) in enumerate(file.rows) if cells[column]]
-        if not there:
-            continue
-        values = np.array([parse_cell(file.rows[i][1][column], file.rows[i][0], title) for i in there])
-        draft.add(slot, Curve(TimeAxis(times[there]), values, uniform_modes(len(there), mode)))
+        if column in faults:
+            parse_cell(*faults[column], title)
+        there = is_there[column]
+        content = b"" if is_full[column] else there.tobytes()
+        if content not in axes:
+            if not there.any():
+                continue
+            axes[content] = TimeAxis(times[there])
+        values = columns[column] if is_full[column] else columns[column][there]
+        axis = axes[content]
+        draft.add(slot, Curve(axis, values * draft.unit(slot), uniform_modes(len(axis), mode)))
+
+
+def _faults(file: _File) -> dict[int, tuple[str, int]]:
+    """The first cell that should be a number and is none, and its line, by column; cells may be empty but for times."""
+    found: dict[int, tuple[str, int]] = {}
+    for line, cells in file.text_rows:
+        for column, cell in enumerate(cells):
+            if column not in found and (cell or column == 0) and parse_number(cell) is None:
+                found[column] = cell, line
+    return found
+
+
+def _row_numbers(cells: list[str] | Floats) -> Floats:
+    """The numbers (C,) of a row, NaN for others."""
+    if not isinstance(cells, list):
+        return cells
+    found = map(parse_number, cells)
+    return np.array([np.nan if number is None else number for number in found])
 
 
 def _read_keys(file: _File, drafts: _NodeBuilders, later: float) -> None:
@@ -200,7 +267,7 @@ def _read_keys(file: _File, drafts: _NodeBuilders, later: float) -> None:
     if unknown:
         raise FormatError(f"unknown column '{min(unknown)}' (expected {', '.join((*KEY_COLUMNS, *EXTRA_COLUMNS))})")
     found: dict[tuple[str, tuple[str, int]], list[KeyRow]] = {}
-    for line, cells in file.rows:
+    for line, cells in file.text_rows:
         row = dict(zip(file.header, cells, strict=True))
         draft, slot = drafts.channel(row["node"], row["channel"], line)
         found.setdefault((draft.name, slot), []).append((line, row))
@@ -208,13 +275,13 @@ def _read_keys(file: _File, drafts: _NodeBuilders, later: float) -> None:
         check_nodes(drafts.named(name), slot, partial(curve_from_rows, rows, later))
 
 
-def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
-    """Return the curve of one channel's rows, shifted by `later` seconds."""
+def curve_from_rows(rows: list[KeyRow], later: float, unit: float) -> Curve:
+    """Return the curve of one channel's rows, shifted by `later` seconds, its values multiplied by `unit`."""
     lines = [line for line, _ in rows]
     times = np.array([parse_cell(row["time"], line, "time") for line, row in rows])
     check_times(times, lines)
     axis = TimeAxis(times + later)
-    values = np.array([parse_cell(row["value"], line, "value") for line, row in rows])
+    values = np.array([parse_cell(row["value"], line, "value") for line, row in rows]) * unit
     modes = np.zeros(len(rows), np.uint8)
     for i, (line, row) in enumerate(rows):
         word = row.get("interpolation") or "linear"
@@ -224,7 +291,7 @@ def curve_from_rows(rows: list[KeyRow], later: float) -> Curve:
     if not (modes == Mode.CUBIC).any():
         return Curve(axis, values, modes)
     _check_tangents(rows, modes.tolist())
-    arriving, leaving = (_handles(rows, key, 0.0) for key in ("in_tangent", "out_tangent"))
+    arriving, leaving = (_handles(rows, key, 0.0) * unit for key in ("in_tangent", "out_tangent"))
     return Curve(axis, values, modes, arriving, leaving, _weights(rows, "in_weight"), _weights(rows, "out_weight"))
 
 

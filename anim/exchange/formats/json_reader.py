@@ -33,23 +33,25 @@ a third. With a repeated axis in the order (ZXZ), angles are rotation.1, .2, .3.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import (
+    UNSPECIFIED,
     PartialConvention,
     fill_from,
     merge_strict,
     parse_convention,
     require_complete,
 )
-from anim.exchange.euler.curve import HANDLES, MODES, WEIGHTS, Curve, Mode
+from anim.exchange.euler.curve import HANDLES, MODES, WEIGHTS, Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import OFFSETS, Convention, EulerMotion, Pivots
 from anim.exchange.formats.json_writer import PIVOT_ROTATIONS, SCHEMA, write
 from anim.exchange.formats.node_builder import MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
@@ -75,6 +77,11 @@ NODE_KEYS = (
     "curves",
 )
 CURVE_KEYS = ("times", "values", "interpolation", *HANDLES)
+KNOWN_KEYS: dict[tuple[str, ...], frozenset[str]] = {
+    keys: frozenset(keys) for keys in (FILE_KEYS, NODE_KEYS, CURVE_KEYS)
+}
+PIVOT_KEYS = frozenset((*OFFSETS, *PIVOT_ROTATIONS))
+NOTHING, ORIGIN, UNSCALED = np.zeros(0), np.zeros(3), np.ones(3)
 
 
 def read(data: bytes, options: PartialConvention) -> EulerMotion:
@@ -94,9 +101,10 @@ def read(data: bytes, options: PartialConvention) -> EulerMotion:
         raise FormatError("has no nodes")
     later, notes = shift_to_zero(_times(nodes))
     drafts, names = [], set[str]()
+    times = _TimeAxes(later)
     for i, node in enumerate(nodes):
         where = f"nodes[{i}]"
-        draft = _node_builder(node, said, later, where)
+        draft = _node_builder(node, said, times, where)
         if draft.name in names:
             raise FormatError(f"a second node '{draft.name}'", where=where)
         names.add(draft.name)
@@ -118,19 +126,41 @@ def _times(nodes: list[Any]) -> Iterator[float]:
                 yield from (time for time in times if type(time) in (int, float) and abs(time) <= MAX_NUMBER)
 
 
-def _node_builder(node: Any, said: PartialConvention, later: float, where: str) -> NodeBuilder:
+class _TimeAxes:
+    """Time axes of curves, moved by `later` seconds; curves with the same times share one."""
+
+    def __init__(self, later: float) -> None:
+        self._later = later
+        self._found: dict[bytes, TimeAxis] = {}
+
+    def check(self, times: Floats) -> None:
+        """Raise FormatError for the first time (K,) that is not after the previous one."""
+        if times.tobytes() not in self._found:
+            for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
+                raise FormatError(f"times not increasing at key {k} ({times[k]:g} s after {times[k - 1]:g} s)")
+
+    def axis(self, times: Floats) -> TimeAxis:
+        """Return the axis of times (K,) in seconds."""
+        content = times.tobytes()
+        if content not in self._found:
+            self._found[content] = TimeAxis(times + self._later)
+        return self._found[content]
+
+
+def _node_builder(node: Any, said: PartialConvention, times: _TimeAxes, where: str) -> NodeBuilder:
     if not isinstance(node, dict) or not isinstance(node.get("name"), str) or not node["name"]:
         raise FormatError("has no name", where=where)
     _check_keys(node, NODE_KEYS, where)
     parent = node.get("parent")
     if parent is not None and not isinstance(parent, str):
         raise FormatError(f"parent is {parent!r} (expected a name)", where=where)
-    convention = require_complete(fill_from(parse_convention(node, where), said))
+    own = parse_convention(node, where) if any(key in node for key in CONVENTION_KEYS) else UNSPECIFIED
+    convention = require_complete(said if own is UNSPECIFIED else fill_from(own, said))
     draft = NodeBuilder(node["name"], convention, parent)
-    draft.translation = _parse_array(node, "translation", (3,), np.zeros(3), where)
-    draft.angles = _parse_array(node, "rotation", (3,), np.zeros(3), where)
-    draft.scale = _parse_array(node, "scale", (3,), np.ones(3), where)
-    if any(key in node for key in (*OFFSETS, *PIVOT_ROTATIONS)):
+    draft.translation = _parse_array(node, "translation", (3,), ORIGIN, where)
+    draft.angles = _parse_array(node, "rotation", (3,), ORIGIN, where)
+    draft.scale = _parse_array(node, "scale", (3,), UNSCALED, where)
+    if not PIVOT_KEYS.isdisjoint(node):
         draft.pivots = _pivots(node, convention, where)
     curves = node.get("curves", {})
     if not isinstance(curves, dict):
@@ -140,7 +170,7 @@ def _node_builder(node: Any, said: PartialConvention, later: float, where: str) 
         try:
             kind, _, axis = channel.partition(".")
             slot = draft.place(kind, axis)
-            check_nodes(draft, slot, partial(_curve, about, later, at))
+            check_nodes(draft, slot, partial(_curve, about, times, at))
         except FormatError as error:
             raise (error if error.where.startswith(at) else error.at(at)) from None
     return draft
@@ -162,34 +192,40 @@ def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivo
     return Pivots(**turns, **offsets)
 
 
-def _curve(about: Any, later: float, where: str) -> Curve:
+def _curve(about: Any, axes: _TimeAxes, where: str, unit: float) -> Curve:
     if not isinstance(about, dict) or not about.keys() >= {"times", "values"}:
         raise FormatError("expected an object with times and values")
     _check_keys(about, CURVE_KEYS, where)
-    times = _parse_array(about, "times", None, np.zeros(0), where)
+    times = _parse_array(about, "times", None, NOTHING, where)
     count = len(times)
-    for k in np.flatnonzero(np.diff(times) <= 0)[:1] + 1:
-        raise FormatError(f"times not increasing at key {k} ({times[k]:g} s after {times[k - 1]:g} s)")
-    values = _parse_array(about, "values", (count,), np.zeros(0), where)
-    given = about.get("interpolation", "linear")
+    axes.check(times)
+    values = _parse_array(about, "values", (count,), NOTHING, where) * unit
+    modes = _parse_modes(about.get("interpolation", "linear"), count)
+    tangents: list[Floats | None] = [None, None]
+    if Mode.CUBIC in modes.tobytes():
+        for i, key in enumerate(("in_tangents", "out_tangents")):
+            if key not in about:
+                raise FormatError(f"a cubic curve lacks {key}")
+            tangents[i] = _parse_array(about, key, (count,), NOTHING, where) * unit
+    weights = [_parse_array(about, key, (count,), NOTHING, where) if key in about else None for key in WEIGHTS]
+    return Curve(axes.axis(times), values, modes, *tangents, *weights)
+
+
+def _parse_modes(given: Any, count: int) -> NDArray[np.uint8]:
+    if isinstance(given, str) and given in MODES:
+        return uniform_modes(count, MODES[given])
     words = given if isinstance(given, list) else [given] * count
     if len(words) != count or not all(isinstance(word, str) and word in MODES for word in words):
         raise FormatError(
             f"interpolation is {given!r} (expected {', '.join(MODES)}, for all or for each of {count} keys)"
         )
-    modes = np.array([MODES[word] for word in words], np.uint8)
-    tangents: list[Floats | None] = [None, None]
-    if (modes == Mode.CUBIC).any():
-        for i, key in enumerate(("in_tangents", "out_tangents")):
-            if key not in about:
-                raise FormatError(f"a cubic curve lacks {key}")
-            tangents[i] = _parse_array(about, key, (count,), np.zeros(0), where)
-    weights = [_parse_array(about, key, (count,), np.zeros(0), where) if key in about else None for key in WEIGHTS]
-    return Curve(TimeAxis(times + later), values, modes, *tangents, *weights)
+    return np.array([MODES[word] for word in words], np.uint8)
 
 
-def _check_keys(about: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+def _check_keys(about: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     """Raise FormatError for an unknown key: a misspelled one would be ignored silently."""
+    if about.keys() <= KNOWN_KEYS[known]:
+        return
     for key in about:
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1)

@@ -15,11 +15,13 @@ from anim.exchange.euler.motion import NO_PIVOTS, Convention, EulerMotion, Euler
 
 MAX_UNIT_M = 1e9  # m; limit of a file's unit of length
 KINDS = {"t": "translation", "r": "rotation", "s": "scale"}
+PATHS = tuple(KINDS.values())
+AXIS_NAMES, ANGLE_NAMES = tuple("xyz"), tuple("xyz123")
 
 
 @dataclass(slots=True)
 class NodeBuilder:
-    """A node under construction. Angles, rotation curves and lengths are in the file's units."""
+    """A node under construction. Angles at rest and lengths are in the file's units, rotation curves in radians."""
 
     name: str
     convention: Convention
@@ -32,22 +34,26 @@ class NodeBuilder:
 
     def place(self, kind: str, axis: str) -> tuple[str, int]:
         """Return the slot of a channel such as ("rotation", "x"). Raises FormatError for others."""
-        if kind == "rotation" and axis in tuple("xyz123"):
+        if kind == "rotation" and axis in ANGLE_NAMES:
             number = axis_index(axis, self.convention.order)
             if number is None:
                 raise FormatError(
                     f"axis '{axis}' has no single place in order {self.convention.order} (expected 1, 2, 3 by place)"
                 )
             return kind, number
-        if kind in KINDS.values() and axis in tuple("xyz"):
-            return kind, "xyz".index(axis)
+        if kind in PATHS and axis in AXIS_NAMES:
+            return kind, AXIS_NAMES.index(axis)
         raise FormatError(f"unknown channel '{kind}.{axis}' (expected translation, rotation or scale, and x, y or z)")
+
+    def unit(self, slot: tuple[str, int]) -> float:
+        """Return radians per unit of a rotation, 1 for lengths and factors."""
+        return self.convention.unit.radians if slot[0] == "rotation" else 1.0
 
     def add(self, slot: tuple[str, int], curve: Curve) -> None:
         """Store a curve in its slot, rotations in radians. Raises FormatError for a used slot."""
         if slot in self.curves:
             raise FormatError(f"a second curve for {slot[0]} {slot[1] + 1} of node '{self.name}'")
-        self.curves[slot] = curve.scaled(self.convention.unit.radians) if slot[0] == "rotation" else curve
+        self.curves[slot] = curve
 
 
 def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tuple[EulerNode, ...], bool]:
@@ -76,10 +82,13 @@ def build_nodes(drafts: list[NodeBuilder], meters_per_unit: float) -> tuple[tupl
     return scale_motion(EulerMotion(nodes), meters_per_unit).nodes, any(node.parent >= 0 for node in nodes)
 
 
-def check_nodes(draft: NodeBuilder, slot: tuple[str, int], build: Callable[[], Curve]) -> None:
-    """Store the curve of `build()` in a node's slot. Raises FormatError with the position of a fault."""
+def check_nodes(draft: NodeBuilder, slot: tuple[str, int], build: Callable[[float], Curve]) -> None:
+    """Store the curve of `build(unit)` in a node's slot. Raises FormatError with the position of a fault.
+
+    unit: the factor of values and tangents, which gives radians.
+    """
     try:
-        draft.add(slot, build())
+        draft.add(slot, build(draft.unit(slot)))
     except FormatError:
         raise
     except AnimError as error:
