@@ -12,7 +12,7 @@ import pytest
 from docs import generate, pages
 from tests.pages import missing
 
-RENEW = "docs/ is not current: run `make docs`"
+RENEW = "docs/ is not current: run `python -m docs.generate`, or `make docs` for the pages"
 NUMBER = re.compile(r"[-+−]?\d+(\.\d+)?(e[-+]?\d+)?")  # in another version of numpy the last digit may differ
 LINK = re.compile(r"(?<!!)\[[^\]]+\]\(([^)#:]+)\)")
 MAX_PICTURES_BYTES = 1_500_000

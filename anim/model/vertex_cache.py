@@ -90,8 +90,9 @@ class VertexCache:
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", arrays.as_key_times(self.times))
         arrays.check_shape(self.faces, "T 3", name="faces")
-        if self.faces.size and int(self.faces.max()) >= self.vertex_count:
-            raise ShapeError(f"a face uses vertex {int(self.faces.max())} of {self.vertex_count}")
+        if self.faces.size and not 0 <= int(self.faces.min()) <= int(self.faces.max()) < self.vertex_count:
+            outside = int(self.faces.min() if self.faces.min() < 0 else self.faces.max())
+            raise ShapeError(f"a face uses vertex {outside} of {self.vertex_count}")
 
     @property
     def frame_count(self) -> int:

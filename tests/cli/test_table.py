@@ -77,7 +77,8 @@ def test_every_command_is_tested_under_its_name(command: str) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_is_in_the_readme(command: str) -> None:
-    assert re.search(rf"gltf-anim {command}\b", (ROOT / "README.md").read_text(encoding="utf-8"))
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.search(rf"gltf-anim {command}\b", text), f"add a line to the README for {command}"
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -140,7 +140,8 @@ def test_quiet_leaves_out_words_and_never_a_product(command: str, folder: Path, 
     assert command in QUIET, f"add a line to QUIET for {command}"
     options, product = QUIET[command]
     run = call(command, *options, "-q")
-    assert (run.code, run.err) == (0, "")
+    assert run.code == 0, run.err
+    assert run.err == ""
     assert run.out.startswith(product)
     assert bool(run.out) == bool(product)
 

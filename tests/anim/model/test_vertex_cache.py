@@ -27,3 +27,9 @@ def test_positions_that_do_not_fit_the_times_are_refused(shape: Any) -> None:
 def test_normals_that_do_not_fit_the_positions_are_refused() -> None:
     with pytest.raises(ShapeError, match="normals has shape"):
         from_arrays(np.arange(2.0), np.zeros((2, 4, 3)), FACES, normals=np.zeros((2, 3, 3)))
+
+
+@pytest.mark.parametrize("vertex", [-1, 4])
+def test_faces_use_vertices_that_are_there(vertex: int) -> None:
+    with pytest.raises(ShapeError, match=f"a face uses vertex {vertex} of 4"):
+        from_arrays(np.arange(2.0), np.zeros((2, 4, 3)), np.array([[0, vertex, 1]]))
