@@ -26,7 +26,7 @@ from anim.show.filmstrip.surface import Surface
 from anim.skinning.bake import bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
-MAX_LOADED_BYTES = 1 << 25  # positions of frames that are baked once for all uses
+MAX_LOADED_BYTES = 48_000_000  # positions of frames that are baked once for all uses: of MAX_FRAMING_VERTICES
 NUM_FRAMING_FRAMES = 48  # frames of the whole motion for the framing of the camera
 MIN_FRAMING_FRAMES = 8  # of these, of meshes with MAX_FRAMING_VERTICES in few frames
 MAX_FRAMING_VERTICES = 4_000_000  # positions of all framing frames

@@ -240,7 +240,7 @@ def _check_size(height: int, width: int, frames: int) -> None:
 def _setup_scene(extent: Extent, look: ViewOptions) -> SceneView:
     if not 32 <= look.height <= 4096:
         raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
-    points = np.asarray(extent.points, np.float64).reshape(-1, 3)
+    points = extent.points.reshape(-1, 3)
     camera = fit_camera(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
     return setup_view(camera, points, extent.ground)
 

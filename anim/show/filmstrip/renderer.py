@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.show.filmstrip.camera import Camera
 from anim.show.filmstrip.rasterizer import visible_faces
 from anim.show.filmstrip.surface_pattern import SurfaceMarks
@@ -48,9 +48,9 @@ class SceneView:
     background: Floats
 
 
-def setup_view(camera: Camera, points: Floats, ground: float) -> SceneView:
+def setup_view(camera: Camera, points: AnyArray, ground: float) -> SceneView:
     """Return the view of a motion with the vertices `points` (P, 3), and the ground at a height in m."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = (np.asarray(each, np.float64) for each in (points.min(axis=0), points.max(axis=0)))
     middle = (low[[0, 2]] + high[[0, 2]]) / 2
     reach = max(float(np.linalg.norm(high - low)) / 2, 1e-6)
     return SceneView(camera, ground, middle, reach, _background(camera, ground, middle, reach, np.zeros(2)))
