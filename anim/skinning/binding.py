@@ -89,14 +89,21 @@ def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], 
 
 
 def ancestor_joints(nodes: Ints, parents: Ints) -> Ints:
-    """Return for each joint (J,) the index of the nearest joint above it, −1 for none."""
+    """Return for each joint (J,) the index of the nearest joint above it, −1 for none.
+
+    Nodes between joints are passed once, however many joints are below them.
+    """
+    if len(nodes) == 1:
+        return np.array([-1])
     number = {node: i for i, node in enumerate(nodes.tolist())}
-    found = []
+    nearest, found = dict(number), []  # of a joint itself, and of the nodes that were passed
     for node in nodes.tolist():
-        at = int(parents[node])
-        while at >= 0 and at not in number:
+        at, passed = int(parents[node]), []
+        while at >= 0 and at not in nearest:
+            passed.append(at)
             at = int(parents[at])
-        found.append(number.get(at, -1))
+        found.append(nearest.get(at, -1))
+        nearest.update(dict.fromkeys(passed, found[-1]))
     return np.array(found, np.int64)
 
 
