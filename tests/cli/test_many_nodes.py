@@ -17,6 +17,7 @@ CALLS_PER_NODE = [  # once twice as many, with an object per node and step
     (many.chain_bare, 3000, "resample --fps 5 OUT", 70),
     (many.chain_bare, 3000, "optimize --jobs 1 OUT", 100),
     (many.chain_bare, 3000, "inspect", 80),
+    (many.side_meshes, 1000, "inspect", 375),
     (many.chain_bare, 3000, "check", 85),
     (many.chain_bare, 3000, "diff IN", 170),
     (many.chain_bare, 3000, "loop OUT --blend 0.1", 100),

@@ -55,8 +55,7 @@ def is_measured_at(scene: Scene) -> str:
 
 def surfaces(scene: Scene) -> list[Surface]:
     """Return one surface per mesh instance; without any vertex, one per node."""
-    found = [_of_instance(scene, instance) for instance in scene.instances if len(instance.mesh.positions)]
-    return found or list(_of_nodes(scene))
+    return _of_instances(scene) or list(_of_nodes(scene))
 
 
 def node_cubes(scene: Scene, diagonal: float) -> Floats:
@@ -75,7 +74,7 @@ def diagonal(scene: Scene) -> float:
     Of the vertices, skinned and morphed; of the nodes without any vertex.
     """
     world = rest_world(scene.skeleton)
-    meshes = [_of_instance(scene, i) for i in scene.instances if len(i.mesh.positions)]
+    meshes = _of_instances(scene)
     points = [place_points(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [
         world[:, :, 3]
     ]
@@ -93,6 +92,8 @@ def place_points(surface: Surface, world: Floats, weights: Floats) -> Floats:
 
 def morph_points(surface: Surface, weights: Floats) -> Floats:
     """Return the points (F, V, 3) in mesh space, morphed by weights (F, M)."""
+    if not len(surface.targets) and len(weights) == 1:
+        return surface.points[None]
     moving = np.flatnonzero(weights.any(axis=0))
     moved = weights[:, moving] @ surface.targets[moving].reshape(len(moving), surface.points.size)
     return np.asarray(surface.points + moved.reshape(len(weights), *surface.points.shape))
@@ -107,25 +108,34 @@ def skin_points(surface: Surface, points: Floats, bound: Floats) -> Floats:
     return moved
 
 
-def _of_instance(scene: Scene, instance: MeshInstance) -> Surface:
-    mesh = instance.mesh
+def _of_instances(scene: Scene) -> list[Surface]:
+    """The surfaces of all instances with vertices; those without a skin share arrays of joints and weights."""
+    rigid: dict[int, tuple[Floats, Ints, Floats]] = {}
+    return [_of_instance(scene, each, rigid) for each in scene.instances if len(each.mesh.positions)]
+
+
+def _of_instance(scene: Scene, instance: MeshInstance, rigid: dict[int, tuple[Floats, Ints, Floats]]) -> Surface:
+    """rigid: bind, joints and weights of meshes without a skin, by their number of vertices; added to."""
+    mesh, count = instance.mesh, len(instance.mesh.positions)
     name = mesh.name or scene.skeleton.display_name(instance.node)
     if instance.skin is not None:
         carried = (instance.skin.joints, instance.skin.inverse_bind, mesh.joints, mesh.weights)
     else:
-        carried = _rigid(instance.node, len(mesh.positions))
+        if count not in rigid:
+            rigid[count] = _rigid(count)
+        carried = (np.array([instance.node], np.int64), *rigid[count])
     nodes, bind, joints, weights = carried
     return Surface(name, nodes, bind, mesh.positions, mesh.targets, joints, weights, instance.node, instance.weights)
 
 
 def _of_nodes(scene: Scene) -> Iterator[Surface]:
-    _, bind, joints, weights = _rigid(0, NUM_CORNERS)
+    bind, joints, weights = _rigid(NUM_CORNERS)
     targets, no_weights = np.empty((0, NUM_CORNERS, 3)), np.empty(0)
     for node, cube in enumerate(node_cubes(scene, diagonal(scene))):
         name = scene.skeleton.display_name(node)
         yield Surface(name, np.array([node]), bind, cube, targets, joints, weights, node, no_weights)
 
 
-def _rigid(node: int, vertices: int) -> tuple[Ints, Floats, Ints, Floats]:
-    one = np.zeros((vertices, 1), np.int64)
-    return np.array([node], np.int64), np.eye(4)[None, :3], one, np.ones((vertices, 1))
+def _rigid(vertices: int) -> tuple[Floats, Ints, Floats]:
+    """Bind (1, 3, 4), joints (V, 1) and weights (V, 1) of vertices that follow one node."""
+    return np.eye(4)[None, :3], np.zeros((vertices, 1), np.int64), np.ones((vertices, 1))
