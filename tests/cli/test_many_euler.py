@@ -55,3 +55,19 @@ def test_columns_and_curves_with_equal_times_share_a_time_axis() -> None:
     assert sorted(curve.values.tolist() for curve in curves) == [[1, 5, 5], [2, 6, 6], [3, 8], [4, 7, 7]]
     parsed = json_reader.read(many.json_curves(50), PartialConvention())
     assert len({curve.time_axis for node in parsed.nodes for curve in curves_of(node)}) == 1
+
+
+@pytest.mark.parametrize("options", [[], ["--order", "auto", "--fps", "3"]])
+def test_angles_of_many_nodes_are_found_at_once(
+    options: list[str], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the angles of each node alone, as an angle tolerance that adds no key asks for."""
+    (tmp_path / "in.glb").write_bytes(many.side_moving(300))
+    line = ["to-euler", str(tmp_path / "in.glb"), str(tmp_path / "a.json"), "--clip", "#0", *options]
+    counted = [count_calls(monkeypatch, euler, name) for name in ("unwrap", "from_quaternion")]
+    call(*line).product()
+    assert all(0 < len(each) < 10 for each in counted)
+    together = (tmp_path / "a.json").read_text()
+    call(*line, "--angle-tolerance", "90deg").product()
+    assert len(counted[0]) > 300
+    assert (tmp_path / "a.json").read_text() == together

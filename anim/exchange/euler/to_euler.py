@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling import frame_times
+from anim.sampling.batch import batches
 from anim.sampling.times import just_before, key_times
 from anim.sampling.track import sample
 
@@ -25,6 +27,7 @@ LOCK_TOLERANCE_RAD = 1e-6  # rad; uncertainty of a lock in a file's float32 quat
 ERROR_FRACTIONS = np.array((0.25, 0.5, 0.75))
 MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
 MAX_ROUNDS, MAX_KEYS = 24, 500_000
+BLOCK_KEYS = 1 << 14  # keys of nodes converted together
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +68,27 @@ def to_euler(
     orders.check(names)
     by_node, lost = _by_node(clip, names)
     asked = _Options(orders, frame, frames, tolerance)
-    found = [_node(skeleton, number, name, by_node.get(number, {}), asked) for number, name in enumerate(names)]
-    nodes, deviation = [node for node, _ in found], max((off for _, off in found), default=0.0)
-    kept = [n for n in range(len(nodes)) if n not in without or n in by_node or (skeleton.parents == n).any()]
+    chosen = [_order(skeleton, number, name, by_node.get(number, {}), asked) for number, name in enumerate(names)]
+    turns = {number: tracks["rotation"] for number, tracks in by_node.items() if "rotation" in tracks}
+    rotations, deviation = _rotations(turns, chosen, asked)
+    resting = _rest_angles(skeleton, chosen, frame)
+    nodes = [
+        EulerNode(
+            name,
+            int(skeleton.parents[number]),
+            skeleton.translation[number],
+            chosen[number],
+            frame,
+            resting[number],
+            rotations.get(number, (None, None, None)),
+            _axes(by_node.get(number, {}).get("translation"), frames),
+            skeleton.scale[number],
+            _axes(by_node.get(number, {}).get("scale"), frames),
+        )
+        for number, name in enumerate(names)
+    ]
+    parents = set(skeleton.parents.tolist())
+    kept = [n for n in range(len(nodes)) if n not in without or n in by_node or n in parents]
     return EulerCurves(EulerMotion(_renumber_nodes(nodes, kept), notes=skipped_note(lost)), deviation)
 
 
@@ -93,29 +114,62 @@ def _by_node(clip: Clip, names: list[str]) -> tuple[dict[int, dict[str, Track]],
     return by_node, lost
 
 
-def _node(
-    skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Options
-) -> tuple[EulerNode, float]:
-    """A node with curves of its tracks by path, and the error of its rotation between keys, rad."""
-    turn, still, frame = tracks.get("rotation"), skeleton.rotation[number], asked.frame
-    order = asked.orders.of(name, still if turn is None else _observed_angles(turn), frame)
-    rotation: tuple[Curve | None, ...] = (None, None, None)
-    deviation = 0.0
-    if turn is not None:
-        rotation, deviation = _rotation(turn, order, asked)
-    node = EulerNode(
-        name,
-        int(skeleton.parents[number]),
-        skeleton.translation[number],
-        order,
-        frame,
-        euler.from_quaternion(still, order=order, frame=frame),
-        rotation,
-        _axes(tracks.get("translation"), asked.frames),
-        skeleton.scale[number],
-        _axes(tracks.get("scale"), asked.frames),
-    )
-    return node, deviation
+def _order(skeleton: Skeleton, number: int, name: str, tracks: dict[str, Track], asked: _Options) -> str:
+    if asked.orders.is_one:
+        return asked.orders.otherwise
+    turn = tracks.get("rotation")
+    return asked.orders.of(name, skeleton.rotation[number] if turn is None else _observed_angles(turn), asked.frame)
+
+
+def _rest_angles(skeleton: Skeleton, orders: Sequence[str], frame: AxesConvention) -> Floats:
+    """Angles (N, 3) of the rest pose, each node's in its order."""
+    found = np.zeros((len(skeleton), 3))
+    order_of = np.array(orders)
+    for order in set(orders):
+        own = order_of == order
+        found[own] = euler.from_quaternion(skeleton.rotation[own], order=order, frame=frame)
+    return found
+
+
+def _rotations(
+    turns: Mapping[int, Track], orders: Sequence[str], asked: _Options
+) -> tuple[dict[int, tuple[Curve, ...]], float]:
+    """Curves of rotations by node, and their greatest error between keys."""
+    found: dict[int, tuple[Curve, ...]] = {}
+    most = 0.0
+    for numbers in _groups(turns, orders, asked):
+        tracks = [turns[number] for number in numbers]
+        convert = _rotation if len(tracks) == 1 else _rotations_on_one_axis
+        curves, deviation = convert(tracks, orders[numbers[0]], asked)
+        found.update(zip(numbers, curves, strict=True))
+        most = max(most, deviation)
+    return found, most
+
+
+def _groups(turns: Mapping[int, Track], orders: Sequence[str], asked: _Options) -> Iterator[list[int]]:
+    """Yield nodes whose rotations are converted at once; single ones where each gets keys of its own."""
+    groups: dict[tuple[TimeAxis, Interpolation, str], list[int]] = {}
+    for number, track in turns.items():
+        groups.setdefault((track.time_axis, track.interpolation, orders[number]), []).append(number)
+    for (axis, _, _), numbers in groups.items():
+        keys = len(axis) if asked.frames is None else max(len(axis), len(asked.frames))
+        size = max(BLOCK_KEYS // keys, 1) if asked.tolerance is None else 1
+        yield from (numbers[first : first + size] for first in range(0, len(numbers), size))
+
+
+def _rotations_on_one_axis(
+    tracks: Sequence[Track], order: str, asked: _Options
+) -> tuple[list[tuple[Curve, ...]], float]:
+    """The curves of each rotation, and their greatest error between keys, as by `_rotation`; all on one time axis."""
+    batch = batches(tracks)[0]
+    stepped = batch.interpolation is Interpolation.STEP
+    times = batch.times if asked.frames is None or stepped else asked.frames
+    angles = euler.unwrap(batch.sample(times), order=order, frame=asked.frame, lock=LOCK_TOLERANCE_RAD)
+    axis, modes = TimeAxis(times), uniform_modes(len(times), Mode.STEP if stepped else Mode.LINEAR)
+    curves = [tuple(Curve(axis, column, modes) for column in node.T) for node in angles.swapaxes(0, 1)]
+    if stepped or len(times) == 1:
+        return curves, 0.0
+    return curves, float(_interval_errors(batch.sample, times, angles, order, asked.frame).max())
 
 
 def _renumber_nodes(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...]:
@@ -129,16 +183,17 @@ def _observed_angles(track: Track) -> Floats:
     return sample(track, unique_sorted(np.concatenate((track.times, halves))))
 
 
-def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, ...], float]:
-    """The three curves of a rotation, and their error between keys."""
+def _rotation(tracks: Sequence[Track], order: str, asked: _Options) -> tuple[list[tuple[Curve, ...]], float]:
+    """The three curves of a single rotation, and their error between keys."""
+    track = tracks[0]
     stepped, frame, tolerance = track.interpolation is Interpolation.STEP, asked.frame, asked.tolerance
     times = track.times if asked.frames is None or stepped else asked.frames
     for _ in range(MAX_ROUNDS):
         angles = euler.unwrap(sample(track, times), order=order, frame=frame, lock=LOCK_TOLERANCE_RAD)
         if stepped or len(times) == 1:
             mode = Mode.STEP if stepped else Mode.LINEAR
-            return _curves(times, angles, mode), 0.0
-        errors = _interval_errors(track, times, angles, order, frame)
+            return [_curves(times, angles, mode)], 0.0
+        errors = _interval_errors(partial(sample, track), times, angles, order, frame)
         if tolerance is None or errors.max() <= tolerance:
             break
         starts, _ = split_segments(times[:-1], times[1:], segment_count(errors, tolerance))
@@ -146,18 +201,24 @@ def _rotation(track: Track, order: str, asked: _Options) -> tuple[tuple[Curve, .
         if len(finer) == len(times) or len(finer) > MAX_KEYS:
             break
         times = finer
-    return _curves(times, angles, Mode.LINEAR), float(errors.max())
+    return [_curves(times, angles, Mode.LINEAR)], float(errors.max())
 
 
-def _interval_errors(track: Track, times: Floats, angles: Floats, order: str, frame: AxesConvention) -> Floats:
-    """Error of linear curves in each interval (K − 1,), rad; 0 at a jump without a float32 time inside."""
-    u = ERROR_FRACTIONS[:, None]
-    at = times[:-1] + (times[1:] - times[:-1]) * u
-    straight = angles[:-1] + (angles[1:] - angles[:-1]) * u[..., None]
-    true = sample(track, at.ravel()).reshape(*at.shape, 4)
+def _interval_errors(
+    sampled: Callable[[Floats], Floats], times: Floats, angles: Floats, order: str, frame: AxesConvention
+) -> Floats:
+    """Error of linear curves (K, ..., 3) in each interval (K − 1, ...), rad; 0 at a jump without a float32 time inside.
+
+    sampled: gives the rotations (F, ..., 4) at times (F,).
+    """
+    at = times[:-1] + (times[1:] - times[:-1]) * ERROR_FRACTIONS[:, None]
+    u = ERROR_FRACTIONS.reshape(-1, *[1] * angles.ndim)
+    straight = angles[:-1] + (angles[1:] - angles[:-1]) * u
+    true = sampled(at.ravel()).reshape(*straight.shape[:-1], 4)
     made = euler.to_quaternion(straight, order=order, frame=frame)
-    jumps = just_before(times[1:]) <= times[:-1]
-    return np.where(jumps, 0.0, quaternion.angle_between(made, true).max(axis=0))
+    errors: Floats = quaternion.angle_between(made, true).max(axis=0)
+    errors[just_before(times[1:]) <= times[:-1]] = 0.0
+    return errors
 
 
 def _axes(track: Track | None, frames: Floats | None) -> dict[int, Curve]:
