@@ -17,11 +17,8 @@ def text(header: Sequence[str], rows: Sequence[Sequence[Cell]], *, left: int = 1
     cells = [[_shown(cell) for cell in row] for row in rows]
     kept = [i for i in range(len(header)) if any(row[i] for row in cells)]
     widths = {i: max(len(header[i]), *(len(row[i]) for row in cells)) for i in kept}
-    lines = []
-    for row in [list(header), *cells]:
-        padded = [row[i].ljust(widths[i]) if i < left else row[i].rjust(widths[i]) for i in kept]
-        lines.append((indent + "  ".join(padded)).rstrip())
-    return "\n".join(lines) + "\n"
+    line = (indent + "  ".join(f"{{{i}:{'<' if i < left else '>'}{widths[i]}}}" for i in kept)).format
+    return "\n".join(line(*row).rstrip() for row in [list(header), *cells]) + "\n"
 
 
 def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
@@ -52,6 +49,8 @@ def cut_middle(words: str, length: int = MAX_QUOTED_LENGTH) -> str:
 
 
 def _shown(cell: Cell) -> str:
+    if type(cell) is str:  # most cells
+        return cell if cell.isprintable() else escape_control(cell)
     if cell is None or cell is False:
         return ""
     if cell is True:

@@ -19,6 +19,7 @@ from anim.arrays import Floats, Ints
 from anim.maths import euler, hierarchy
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
+from anim.measure.inspect import storage_cost
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
@@ -355,3 +356,17 @@ def morphing_clips(count: int) -> bytes:
     document = json.loads(many.clips_equal(count)[20:].rstrip(b"\0 "))
     targets = {**many.MESH["primitives"][0], "targets": [{"POSITION": 2}]}
     return text({**document, "meshes": [{"primitives": [targets], "weights": [0.5]}]})
+
+
+def test_accessors_that_clips_share_are_described_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond them each clip has its own JSON only."""
+    (tmp_path / "in.gltf").write_bytes(equal_clips(CLIPS))
+    counted = _count_calls(monkeypatch, storage_cost, "_text")
+    report = call("inspect", tmp_path / "in.gltf", "--format", "json").json["files"][0]
+    assert len(counted) < CLIPS + 10
+    costs = [each["json_bytes"] for each in report["clips"]]
+    shared = report["clips"][0]["json_bytes"] * CLIPS - report["animation_json_bytes"]
+    assert costs[0] < costs[-1] == costs[0] + len("c299") - len("c0")
+    assert shared > 0

@@ -28,16 +28,24 @@ def storage_costs(document: Document) -> tuple[list[StorageCost], StorageCost]:
     content = document.json
     accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
     alone: list[StorageCost] = []
+    used: dict[tuple[int, ...], tuple[int, int, set[int]]] = {}  # by accessors: data, JSON, and views
+    num_users: Counter[tuple[int, ...]] = Counter()
+    for animation in json_array(content, "animations"):
+        numbers = tuple(sorted({sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}))
+        if numbers not in used:
+            named = [accessors[i] for i in numbers]
+            of_views = {view for accessor in named for view in views_of(accessor)}
+            described = [named, [views[i] for i in sorted(of_views)]]
+            text = sum(len(_text(part)) - 1 for part in described if part)
+            used[numbers] = sum(map(_size, named)), text, of_views
+        data, text, _ = used[numbers]
+        alone.append(StorageCost(data, len(_text(animation)) + 1 + text))
+        num_users[numbers] += 1
     users_of_accessor: Counter[int] = Counter()
     users_of_view: Counter[int] = Counter()
-    for animation in json_array(content, "animations"):
-        numbers = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
-        named = [accessors[i] for i in sorted(numbers)]
-        of_views = {view for accessor in named for view in views_of(accessor)}
-        described = [[animation], named, [views[i] for i in sorted(of_views)]]
-        alone.append(StorageCost(sum(map(_size, named)), sum(len(_text(part)) - 1 for part in described if part)))
-        users_of_accessor.update(numbers)
-        users_of_view.update(of_views)
+    for numbers, count in num_users.items():
+        users_of_accessor.update(dict.fromkeys(numbers, count))
+        users_of_view.update(dict.fromkeys(used[numbers][2], count))
     extra = [(accessors[i], count - 1) for i, count in users_of_accessor.items() if count > 1]
     repeated = [(views[i], count - 1) for i, count in users_of_view.items() if count > 1]
     data = sum(part.data for part in alone) - sum(_size(about) * times for about, times in extra)
