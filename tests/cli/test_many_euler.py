@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from anim.curves.fitting import stacked_keys
-from anim.exchange.euler import from_euler
+from anim.exchange.euler import curve, from_euler, to_bvh_motion
 from anim.exchange.euler.baked_keys import curves_of
 from anim.exchange.euler.convention import PartialConvention
 from anim.exchange.euler.motion import Unit
@@ -50,11 +50,11 @@ def test_columns_and_curves_with_equal_times_share_a_time_axis() -> None:
     """Of a column with a hole, and of a curve with other times, there is a second one."""
     intrinsic = PartialConvention("XYZ", AxesConvention.INTRINSIC, Unit.RAD)
     made = csv_reader.read(b"time,a.rx,a.ry,b.tx,b.ty\n0,1,2,3,4\n1,5,6,,7\n2,5,6, 8 ,7\n", intrinsic)
-    curves = [curve for node in made.nodes for curve in curves_of(node)]
-    assert len({curve.time_axis for curve in curves}) == 2
-    assert sorted(curve.values.tolist() for curve in curves) == [[1, 5, 5], [2, 6, 6], [3, 8], [4, 7, 7]]
+    curves = [each for node in made.nodes for each in curves_of(node)]
+    assert len({each.time_axis for each in curves}) == 2
+    assert sorted(each.values.tolist() for each in curves) == [[1, 5, 5], [2, 6, 6], [3, 8], [4, 7, 7]]
     parsed = json_reader.read(many.json_curves(50), PartialConvention())
-    assert len({curve.time_axis for node in parsed.nodes for curve in curves_of(node)}) == 1
+    assert len({each.time_axis for node in parsed.nodes for each in curves_of(node)}) == 1
 
 
 @pytest.mark.parametrize("options", [[], ["--order", "auto", "--fps", "3"]])
@@ -71,3 +71,10 @@ def test_angles_of_many_nodes_are_found_at_once(
     call(*line, "--angle-tolerance", "90deg").product()
     assert len(counted[0]) > 300
     assert (tmp_path / "a.json").read_text() == together
+
+
+def test_curves_of_a_bvh_share_their_modes(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "in.glb").write_bytes(many.side_moving(300))
+    counted = [count_calls(monkeypatch, module, "uniform_modes") for module in (curve, to_bvh_motion)]
+    call("to-euler", tmp_path / "in.glb", tmp_path / "a.bvh", "--clip", "#0").product()
+    assert sum(map(len, counted)) == 1

@@ -6,10 +6,11 @@ from collections.abc import Collection, Sequence
 from itertools import takewhile
 
 import numpy as np
+from numpy.typing import NDArray
 
-from anim.arrays import Floats
+from anim.arrays import Floats, freeze
 from anim.errors import RangeError, UnsupportedError
-from anim.exchange.euler.curve import Curve, linear
+from anim.exchange.euler.curve import Curve, Mode, uniform_modes
 from anim.exchange.euler.frame_error import frame_error
 from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
 from anim.exchange.euler.rotation_order import OrderRules
@@ -108,6 +109,7 @@ def _nodes(
 ) -> list[EulerNode]:
     """Joints with their required curves; lengths in the file's unit, keys at times `shown`."""
     axis, size = TimeAxis(shown), max(1, BLOCK_VALUES // len(shown))
+    modes = uniform_modes(len(shown), Mode.LINEAR)
     made = []
     for first in range(0, len(names), size):
         some = slice(first, first + size)
@@ -116,7 +118,7 @@ def _nodes(
         moved = (parents < 0) | (np.abs(path - offset).max(axis=(0, 2)) > CONSTANT_TOLERANCE * figure.size)
         end = (parents >= 0) & ~moved & figure.is_end[some]
         chosen = [orders.of(name, turn[:, i]) for i, name in enumerate(names[some])]
-        angles = _angles(turn, chosen)
+        angles, paths = _by_curve(_angles(turn, chosen)), _by_curve(path / meters_per_unit)
         for i, name in enumerate(names[some]):
             made.append(
                 EulerNode(
@@ -126,8 +128,8 @@ def _nodes(
                     chosen[i],
                     AxesConvention.INTRINSIC,
                     np.zeros(3),
-                    (None, None, None) if end[i] else tuple(_curves(axis, angles[:, i])),
-                    dict(enumerate(_curves(axis, path[:, i] / meters_per_unit))) if moved[i] else {},
+                    (None, None, None) if end[i] else tuple(_curves(axis, angles[i], modes)),
+                    dict(enumerate(_curves(axis, paths[i], modes))) if moved[i] else {},
                     end=bool(end[i]),
                 )
             )
@@ -220,5 +222,10 @@ def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int])
     ]
 
 
-def _curves(axis: TimeAxis, values: Floats) -> list[Curve]:
-    return [linear(axis, column) for column in values.T]
+def _by_curve(values: Floats) -> Floats:
+    """Values (n, 3, F) of each curve from those (F, n, 3) of frames, read-only, so that curves share them."""
+    return freeze(values.transpose(1, 2, 0).copy())
+
+
+def _curves(axis: TimeAxis, values: Floats, modes: NDArray[np.uint8]) -> list[Curve]:
+    return [Curve(axis, each, modes) for each in values]
