@@ -1,19 +1,23 @@
 """A function that runs in a process of its own, since a native package may crash, hang or print on a hostile file.
 
-The child ends with the block that reads from it, so that a signal to this process is heard while native code runs.
+The child ends with the block that reads from it, so that a signal to this process is heard while native code runs. It
+also ends with this process, however that ends: it waits for the end of its stdin, which this process holds open.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import pickle
 import subprocess
 import sys
+import threading
+import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import IO, Any
 
-from anim.errors import AnimError
+from anim.errors import AnimError, UnsupportedError
 from anim.memory import limit_allocations
 
 # The child has this process's path of modules and no other: `-I` leaves out the current folder and $PYTHONPATH.
@@ -21,16 +25,22 @@ PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from anim.caches import child
 
 
 class ChildEndedError(Exception):
-    """The child ended before its work did: a crash, or an error that no package of ours raises."""
+    """The child ended before its work did: native code has crashed, or the system ended it."""
 
 
 @contextmanager
 def run_in_child(function: Callable[..., Iterator[Any]], *arguments: Any, limit_bytes: int) -> Iterator[Iterator[Any]]:
     """Provide what a generator function yields in a child process; function and arguments as for `pickle`.
 
-    limit_bytes: of memory that it may allocate (on Linux). Reading raises the function's AnimError or MemoryError, and
-    ChildEndedError if the child ends without one. At the end of the block the child is ended.
+    limit_bytes: of memory that it may allocate (on Linux). Reading raises the function's AnimError or MemoryError,
+    RuntimeError with the traceback of any other error, and ChildEndedError if the child ends without one. At the end of
+    the block the child is ended. Raises UnsupportedError where no Python can be started (a program that embeds it).
     """
+    task = pickle.dumps((function, arguments, limit_bytes))
+    if not sys.executable or getattr(sys, "frozen", False):
+        raise UnsupportedError(
+            "it is read by a process of its own, which needs a Python interpreter that can be started"
+        )
     process = subprocess.Popen(
         [sys.executable, "-I", "-c", PROGRAM, *sys.path],
         stdin=subprocess.PIPE,
@@ -41,11 +51,13 @@ def run_in_child(function: Callable[..., Iterator[Any]], *arguments: Any, limit_
     assert process.stdout is not None
     with process.stdout:
         try:
-            _send(process.stdin, pickle.dumps((function, arguments, limit_bytes)))
+            _send(process.stdin, task)
             yield _messages(process.stdout)
         finally:
             process.kill()
             process.wait()
+            with suppress(OSError):
+                process.stdin.close()
 
 
 def serve() -> None:
@@ -53,6 +65,7 @@ def serve() -> None:
     with os.fdopen(0, "rb") as source, os.fdopen(os.dup(1), "wb") as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what native packages print
         function, arguments, limit_bytes = pickle.load(source)
+        threading.Thread(target=_end_with, args=(source,), daemon=True).start()
         try:
             with limit_allocations(limit_bytes):
                 for message in function(*arguments):
@@ -63,15 +76,26 @@ def serve() -> None:
             end = type(error)(error.problem, where=error.where, help=error.help)
         except MemoryError:
             end = MemoryError()
+        except Exception:
+            end = RuntimeError(traceback.format_exc())
         pickle.dump((None, end), out)
+        out.flush()
+        os._exit(0)  # the thread reads from a file that a normal exit would close
+
+
+def _end_with(source: IO[bytes]) -> None:
+    """Exit when the parent has closed its end of stdin, as the system does when it exits."""
+    source.read(1)
+    os._exit(1)
 
 
 def _send(pipe: IO[bytes], data: bytes) -> None:
     try:
-        with pipe:
-            pipe.write(data)
-    except BrokenPipeError:  # it has ended: reading says so
-        pass
+        pipe.write(data)
+        pipe.flush()
+    except OSError as error:  # it has ended: reading says so
+        if error.errno not in (errno.EPIPE, errno.EINVAL):  # EINVAL: the same on Windows
+            raise
 
 
 def _messages(pipe: IO[bytes]) -> Iterator[Any]:

@@ -24,6 +24,8 @@ def temp_output(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
         path = Path(folder) / f"output{ending}"
         try:
             yield str(path)
+        except (RecursionError, NotImplementedError):
+            raise
         except RuntimeError as error:  # of native packages, which hide the reason or spread it over many lines
             help = f"is there room for temporary files in {tempfile.gettempdir()}? TMPDIR names another folder"
             raise OutputError(f"{name}: can't be written as {ending} in a temporary file", help=help) from error

@@ -86,16 +86,17 @@ def _received(stack: ExitStack) -> CacheFolder:
     """Stdin as a file in a temporary folder, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
-    blocks = iter(lambda: sys.stdin.buffer.read(COPY_BYTES), b"")
-    try:
-        first = next(blocks, b"")
-    except OSError as error:
-        raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "stdin"
     try:
         with path.open("wb") as file:
-            file.write(first)
-            file.writelines(blocks)
+            file.writelines(iter(_read_block, b""))
     except OSError as error:
         raise not_written("the temporary file for stdin", error).advise("TMPDIR names another folder for it") from None
     return CacheFolder(path)
+
+
+def _read_block() -> bytes:
+    try:
+        return sys.stdin.buffer.read(COPY_BYTES)
+    except OSError as error:
+        raise FormatError(f"stdin can't be read ({(error.strerror or str(error)).lower()})") from None

@@ -153,8 +153,12 @@ def test_jobs_in_one_process_and_in_several_make_the_same(crowd: Path, call: Cal
 
 
 def test_many_messages_fit_in_the_buffer_of_a_pipe() -> None:
-    lines = [f"{i}: {'x' * 290}" for i in range(1000)]
-    found = shorten(lines)
-    assert (found[0], found[80], found[-1]) == (lines[0], "… 900 more lines", lines[-1])
-    assert len(pickle.dumps(JobResult(0, found))) < 1 << 16
-    assert shorten(lines[:100]) == tuple(lines[:100])
+    for letter in ("x", "字"):
+        lines = [f"{i}: {letter * 290}" for i in range(1000)]
+        found = shorten(lines)
+        left = 1001 - len(found)
+        assert f"… {left} more lines" in found
+        assert (found[0], found[-1]) == (lines[0], lines[-1])
+        assert len(pickle.dumps(JobResult(0, found))) < 1 << 15
+    assert shorten(lines[:30]) == tuple(lines[:30])
+    assert shorten([]) == ()

@@ -53,7 +53,7 @@ class StackedKeys(NamedTuple):
     values: Floats
 
 
-def stacked_linear_keys(stack: MotionStack, motion: Ints, knots: Floats, *, tolerance: float) -> StackedKeys:
+def fit_linear_keys(stack: MotionStack, motion: Ints, knots: Floats, *, tolerance: float) -> StackedKeys:
     """Return the keys that `adaptive_keys.linear_keys` gives each motion, equal to the bit.
 
     motion, knots: (T,) index and time of each knot; by motion, increasing times within each. Motions that need more

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from anim.exchange.euler.evaluate import (
 )
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
 from anim.exchange.euler.node_stack import PATHS, path_curves
-from anim.exchange.euler.stacked_tracks import NodeKeys, blocks, stacked_keys
+from anim.exchange.euler.stacked_tracks import NodeKeys, divide_nodes, fit_nodes
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.model.time_axis import merge_times
@@ -65,11 +65,11 @@ def from_euler(
     size = bounding_size(bones) or 1.0
     builder = _TrackBuilder(size)
     adaptive = False
-    for block in blocks(motion.nodes):
+    for block in divide_nodes(motion.nodes):
         nodes = {number: motion.nodes[number] for number in block}
         on_grid = {number: is_baked(motion, node, keys) for number, node in nodes.items()}
         adaptive = adaptive or any(not on_grid[number] and _changes(node) for number, node in nodes.items())
-        builder.add(nodes, {number: None if on_grid[number] else tolerance for number in nodes})
+        builder.add(nodes, tolerance, sampled={number for number in nodes if on_grid[number]})
     ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
     tracks = tuple(share_time_axes(builder.tracks))
     return ImportedMotion(bones, Clip(name, tracks), ends, tolerance if adaptive else None)
@@ -89,21 +89,23 @@ class _TrackBuilder:
         self._stored = Float32Times()
         self._axes: dict[bytes, TimeAxis] = {}
 
-    def add(self, nodes: Mapping[int, EulerNode], tolerances: Mapping[int, float | None]) -> None:
-        """Add the tracks of nodes; their tolerances in radians, None adds no keys."""
-        found = stacked_keys(nodes, tolerances, self._units)
+    def add(self, nodes: Mapping[int, EulerNode], tolerance: float, *, sampled: Collection[int]) -> None:
+        """Add the tracks of nodes. tolerance: rad. sampled: those to which no keys are added."""
+        found = fit_nodes(nodes, tolerance, self._units, sampled=sampled)
         for number, node in nodes.items():
             try:
                 for path in PATHS:
                     if path_curves(node, path):
-                        keys = found.get((number, path)) or self._alone(node, path, tolerances[number])
+                        keys = found.get((number, path)) or self._alone(
+                            node, path, None if number in sampled else tolerance
+                        )
                         self._add(number, node, path, keys)
             except AnimError as error:
                 raise error.at(f"node '{node.name}'") from None
 
     def _alone(self, node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
         unit = self._units[path]
-        return node_keys(self._stored.node(node), path, None if tolerance is None else tolerance * unit)
+        return fit_node(self._stored.node(node), path, None if tolerance is None else tolerance * unit)
 
     def _add(self, number: int, node: EulerNode, path: str, keys: NodeKeys) -> None:
         """Add a track unless it is equal to the rest pose: many recorders write six channels for every joint."""
@@ -118,10 +120,10 @@ class _TrackBuilder:
         self.tracks.append(Track(number, path, keys.interpolation, axis, keys.values))
 
 
-def node_keys(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
+def fit_node(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
     """Return the keys of one path of a node; tolerance, in the path's own unit: None adds no keys.
 
-    The node's times are those of float32. `stacked_keys` gives many short nodes the same ones.
+    The node's times are those of float32. `fit_nodes` gives many short nodes the same ones.
     """
     curves = path_curves(node, path)
     knots = merge_times(curve.time_axis for curve in curves)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, freeze
-from anim.curves.fitting.stacked_keys import MotionStack, StackedKeys, align_signs, stacked_linear_keys
+from anim.curves.fitting.stacked_keys import MotionStack, StackedKeys, align_signs, fit_linear_keys
 from anim.exchange.euler.baked_keys import curves_of
 from anim.exchange.euler.motion import NO_PIVOTS, EulerNode
 from anim.exchange.euler.node_stack import PATHS, NodeStack
@@ -27,7 +27,7 @@ class NodeKeys(NamedTuple):
     values: Floats
 
 
-def blocks(nodes: Sequence[EulerNode]) -> Iterator[range]:
+def divide_nodes(nodes: Sequence[EulerNode]) -> Iterator[range]:
     """Yield ranges of nodes to convert together, so that memory is that of one block."""
     first, keys = 0, 0
     for number, node in enumerate(nodes):
@@ -38,12 +38,12 @@ def blocks(nodes: Sequence[EulerNode]) -> Iterator[range]:
     yield range(first, len(nodes))
 
 
-def stacked_keys(
-    nodes: Mapping[int, EulerNode], tolerances: Mapping[int, float | None], units: Mapping[str, float]
+def fit_nodes(
+    nodes: Mapping[int, EulerNode], tolerance: float, units: Mapping[str, float], *, sampled: Collection[int] = ()
 ) -> dict[tuple[int, str], NodeKeys]:
     """Return keys by node and path; nodes and paths that take as long alone are omitted.
 
-    tolerances: rad, of each node; None adds no keys. units: of the tolerance by path: metres and factors per radian.
+    tolerance: rad. units: of the tolerance by path: metres and factors per radian. sampled: nodes without added keys.
     """
     groups: dict[tuple[str, AxesConvention, bool], list[int]] = {}
     for number, node in nodes.items():
@@ -53,9 +53,8 @@ def stacked_keys(
     for numbers in groups.values():
         stack = NodeStack([nodes[number] for number in numbers])
         for path in PATHS:
-            sampled = np.array([tolerances[number] is None for number in numbers])
-            tolerance = max((t for number in numbers if (t := tolerances[number]) is not None), default=0.0)
-            for i, keys in _path_keys(stack, path, sampled, tolerance * units[path]):
+            at_keys = np.array([number in sampled for number in numbers])
+            for i, keys in _path_keys(stack, path, at_keys, tolerance * units[path]):
                 found[numbers[i], path] = keys
     return found
 
@@ -76,7 +75,7 @@ def _path_keys(stack: NodeStack, path: str, sampled: Bools, tolerance: float) ->
             rotation=path == "rotation",
             travel=stack.travel if path == "rotation" else None,
         )
-        keys = stacked_linear_keys(motions, node[~at_knots], knots[~at_knots], tolerance=tolerance)
+        keys = fit_linear_keys(motions, node[~at_knots], knots[~at_knots], tolerance=tolerance)
         yield from _by_node(keys, stepped)
 
 

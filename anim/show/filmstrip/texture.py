@@ -73,7 +73,9 @@ class PixelBudget:
         left = self._left + PIXELS_PER_BYTE * size
         limit = min(left, MAX_PIXELS)
         if width * height > limit:
-            raise FormatError(f"has {width} × {height} pixels (limit {limit / 1e6:.3g} million, by the file's size)")
+            raise FormatError(
+                f"has {width} × {height} pixels (limit {limit / 1e6:.3g} million for images of so few bytes)"
+            )
         self._left = left - width * height
 
 
@@ -92,7 +94,7 @@ def decode_image(data: Bytes, budget: PixelBudget | None = None) -> Texels:
             (budget or PixelBudget()).take(image.width, image.height, len(data))
             image.draft("RGB", (MAX_SIDE, MAX_SIDE))
             pixels = _as_bytes(image)
-            if pixels.mode not in REDUCIBLE:
+            if pixels.mode not in REDUCIBLE or "transparency" in image.info:  # a color that is transparent
                 pixels = pixels.convert("RGBA")
             pixels.thumbnail((MAX_SIDE, MAX_SIDE))
             return np.array(pixels.convert("RGBA"))

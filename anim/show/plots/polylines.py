@@ -105,14 +105,15 @@ def is_dense(track: Track) -> bool:
 def keep_extremes(line: Polyline) -> Polyline:
     """Return the least and largest values in short spans of a line of very many points; of fewer the line itself.
 
-    Drawn, they look the same.
+    Drawn, they look the same, but for jumps, which are joined.
     """
     count, width = line.values.shape
     if count <= 4 * DENSE_KEYS:  # points at each key, as of tracks that are not dense
         return line
     starts = np.arange(0, count, -(-count // DENSE_SPANS))
-    ends = [part.reduceat(line.values, starts, axis=0) for part in (np.fmin, np.fmax)]  # NaN only where all are
-    return Polyline(np.repeat(line.times[starts], 2), np.stack(ends, axis=1).reshape(-1, width))
+    extremes = [part.reduceat(line.values, starts, axis=0) for part in (np.fmin, np.fmax)]  # NaN only where all are
+    times = line.times[np.stack((starts, np.append(starts[1:], count) - 1), axis=1)]
+    return Polyline(times.reshape(-1), np.stack(extremes, axis=1).reshape(-1, width))
 
 
 def _points(track: Track, *, pieces_only: bool) -> tuple[Floats, Bools]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import itertools
 import os
 import shlex
 import time
@@ -27,7 +29,7 @@ from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 from cli.workflows.run.steps import Step
 
 EMPTY: Bytes = np.empty(0, np.uint8)
-MAX_FIRST_MESSAGES, MAX_LAST_MESSAGES = 80, 20  # lines of at most 300 characters
+MAX_FIRST_BYTES, MAX_LAST_BYTES = 20_000, 10_000  # of messages, together half of a pipe's buffer
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,14 @@ def run_job(job: Job) -> JobResult:
 def shorten(messages: Sequence[str]) -> tuple[str, ...]:
     """Return the first and last of many messages: errors are the last.
 
-    Results fit in the buffer of a pipe, so that a worker which is killed leaves none that is half written.
+    They fit in the buffer of a pipe, so that a worker which is killed leaves none that is half written.
     """
-    if len(messages) <= MAX_FIRST_MESSAGES + MAX_LAST_MESSAGES:
+    ends = list(itertools.accumulate(len(each.encode()) for each in messages))
+    if not ends or ends[-1] <= MAX_FIRST_BYTES + MAX_LAST_BYTES:
         return tuple(messages)
-    left = len(messages) - MAX_FIRST_MESSAGES - MAX_LAST_MESSAGES
-    return (*messages[:MAX_FIRST_MESSAGES], f"… {left} more lines", *messages[-MAX_LAST_MESSAGES:])
+    first = bisect.bisect_right(ends, MAX_FIRST_BYTES)
+    last = bisect.bisect_left(ends, ends[-1] - MAX_LAST_BYTES) + 1
+    return (*messages[:first], f"… {last - first} more lines", *messages[last:])
 
 
 def _check_version(version: str) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 
 from anim.caches.child_process import ChildEndedError, run_in_child
-from anim.errors import FormatError
+from anim.errors import FormatError, UnsupportedError
 
 GB = 10**9
 
@@ -72,16 +74,63 @@ def test_errors_of_ours_pass() -> None:
     assert caught.value.__notes__ == ["help: look"]
 
 
-@pytest.mark.parametrize("function", [crashed, wrong])
-def test_a_child_that_ends_is_an_error(function: Any) -> None:
+def test_a_child_that_ends_is_an_error() -> None:
     with pytest.raises(ChildEndedError):
-        taken(function)
+        taken(crashed)
+
+
+def test_other_errors_have_their_traceback() -> None:
+    with pytest.raises(RuntimeError, match="KeyError: 'of ours'"):
+        taken(wrong)
+
+
+def test_where_no_python_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", "")
+    with pytest.raises(UnsupportedError, match="interpreter"):
+        taken(modules)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has this limit")
 def test_memory_has_a_limit() -> None:
     with pytest.raises(MemoryError):
         taken(greedy)
+
+
+PARENT = """
+import sys
+from anim.caches.child_process import run_in_child
+from tests.anim.caches.test_child_process import endless
+with run_in_child(endless, sys.argv[1], limit_bytes=10**9) as messages:
+    print(next(messages), flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are found in /proc")
+def test_the_child_ends_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, str(tmp_path / "a")],
+        cwd=Path(__file__).parents[3],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert parent.stdout is not None
+    child = int(parent.stdout.readline())
+    parent.kill()
+    parent.communicate()
+    end = time.monotonic() + 120
+    while is_running(child) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not is_running(child)
+
+
+def is_running(number: int) -> bool:
+    """Return whether a process works: one that nobody has waited for doesn't."""
+    try:
+        state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state not in "ZX"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signal 0")

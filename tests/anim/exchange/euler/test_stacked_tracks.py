@@ -11,11 +11,11 @@ from anim.curves.fitting import stacked_keys as fitting
 from anim.exchange.euler import from_euler as conversion
 from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement
 from anim.exchange.euler.curve import Curve, Mode
-from anim.exchange.euler.from_euler import from_euler, node_keys
+from anim.exchange.euler.from_euler import fit_node, from_euler
 from anim.exchange.euler.gimbal import gimbal_stats
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode, Pivots
 from anim.exchange.euler.node_stack import PATHS, path_curves
-from anim.exchange.euler.stacked_tracks import BLOCK_KEYS, NodeKeys, blocks, stacked_keys
+from anim.exchange.euler.stacked_tracks import BLOCK_KEYS, NodeKeys, divide_nodes, fit_nodes
 from anim.maths import euler
 from anim.maths.euler import AxesConvention
 from anim.model import TimeAxis
@@ -61,13 +61,12 @@ def _motion(seed: int, count: int = 12) -> EulerMotion:
 @given(st.integers(0, 10**6), st.sampled_from((0.05, 0.005)))
 def test_nodes_together_have_the_keys_of_each_node_alone(seed: int, tolerance: float) -> None:
     nodes, stored = dict(enumerate(_motion(seed).nodes)), Float32Times()
-    tolerances = {number: None if number % 3 == 0 else tolerance for number in nodes}
-    found = stacked_keys(nodes, tolerances, UNITS)
+    sampled = [number for number in nodes if number % 3 == 0]
+    found = fit_nodes(nodes, tolerance, UNITS, sampled=sampled)
     expected = {(number, path) for number, node in nodes.items() for path in PATHS if path_curves(node, path)}
     assert found.keys() == expected
     for (number, path), keys in found.items():
-        own = tolerances[number]
-        alone = node_keys(stored.node(nodes[number]), path, None if own is None else own * UNITS[path])
+        alone = fit_node(stored.node(nodes[number]), path, None if number in sampled else tolerance * UNITS[path])
         assert keys.interpolation == alone.interpolation
         assert keys.times.tobytes() == alone.times.tobytes()
         assert keys.values.tobytes() == alone.values.tobytes()
@@ -78,13 +77,13 @@ def test_long_motions_are_left_to_be_fitted_alone(monkeypatch: pytest.MonkeyPatc
     motion = _motion(3, 20)
     whole = from_euler(motion, tolerance=0.002, keys=KeyPlacement.ADAPTIVE)
     counted = []
-    alone = conversion.node_keys
+    alone = conversion.fit_node
 
     def called(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
         counted.append(node.name)
         return alone(node, path, tolerance)
 
-    monkeypatch.setattr(conversion, "node_keys", called)
+    monkeypatch.setattr(conversion, "fit_node", called)
     monkeypatch.setattr(fitting, "MAX_STACK_KEYS", 100)
     assert from_euler(motion, tolerance=0.002, keys=KeyPlacement.ADAPTIVE).clip == whole.clip
     assert 2 < len(counted) < len(whole.clip.tracks)
@@ -107,5 +106,5 @@ def test_blocks_hold_every_node_once() -> None:
     long = Curve(TimeAxis(np.arange(1.0, BLOCK_KEYS)), np.ones(BLOCK_KEYS - 1), np.full(BLOCK_KEYS - 1, Mode.LINEAR))
     many = EulerNode("long", -1, np.zeros(3), "X", AxesConvention.INTRINSIC, np.zeros(1), (long,))
     nodes = [node, many, many, many, node]
-    assert [list(block) for block in blocks(nodes)] == [[0, 1], [2, 3], [4]]
-    assert [list(block) for block in blocks([])] == [[]]
+    assert [list(block) for block in divide_nodes(nodes)] == [[0, 1], [2, 3], [4]]
+    assert [list(block) for block in divide_nodes([])] == [[]]

@@ -107,7 +107,7 @@ def test_images_of_many_pixels_are_refused(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(texture, "PIXELS_PER_BYTE", 1)
     budget = texture.PixelBudget()
     decode_image(data, budget)
-    with pytest.raises(FormatError, match=r"has 90 × 90 pixels .*by the file's size"):
+    with pytest.raises(FormatError, match=r"has 90 × 90 pixels .*for images of so few bytes"):
         decode_image(data, budget)
     monkeypatch.setattr(texture, "MAX_PIXELS", 8000)
     with pytest.raises(FormatError, match="has 90 × 90 pixels"):
@@ -122,3 +122,16 @@ def test_reduced_images_are_the_average_of_their_pixels(mode: str, monkeypatch: 
     expected = Image.open(io.BytesIO(data.tobytes())).convert("RGBA")
     expected.thumbnail((4, 4))
     np.testing.assert_allclose(decode_image(data).astype(int), np.array(expected).astype(int), atol=1)
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB"])
+def test_a_transparent_color_is_no_part_of_the_average(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(texture, "MAX_SIDE", 2)
+    image = Image.new(mode, (4, 4), 0)
+    image.paste(200 if mode == "L" else (200, 200, 200), (0, 0, 1, 4))
+    out = io.BytesIO()
+    image.save(out, "PNG", transparency=0 if mode == "L" else (0, 0, 0))
+    left, right = decode_image(np.frombuffer(out.getvalue(), np.uint8))[0].tolist()
+    assert left[:3] == [200, 200, 200]
+    assert 100 < left[3] < 156
+    assert right[3] == 0

@@ -125,6 +125,7 @@ def test_a_line_of_very_many_points_keeps_its_extremes(monkeypatch: pytest.Monke
     short = polylines.keep_extremes(line)
     assert len(short.times) <= 2 * polylines.DENSE_SPANS
     assert (np.diff(short.times) >= 0).all()
+    assert (short.times[0], short.times[-1]) == (0, 1)
     for extreme in (np.nanmin, np.nanmax):
         np.testing.assert_array_equal(extreme(short.values, axis=0), extreme(values, axis=0))
     assert np.isnan(short.values).any()
