@@ -83,7 +83,10 @@ class Skeleton:
         return hierarchy.with_descendants(self.parents, found)
 
     def derive(self, compute: Callable[[Skeleton], Floats]) -> Floats:
-        """Return the array that a function computes from this skeleton, read-only: computed once, kept here."""
+        """Return the array that a function computes from this skeleton, read-only: computed once, kept here.
+
+        compute: a function of a module; one that is made for the call would be kept, and never found again.
+        """
         if compute not in self._derived:
             self._derived[compute] = arrays.own(compute(self))
         found: Floats = self._derived[compute]

@@ -43,7 +43,7 @@ class ChunkPipeline:
         While the caller uses one chunk the next is skinned, and the poses of the one after it are sampled.
         """
         sampler, step = PoseSampler(self.skeleton, clip), self._frames_per_chunk()
-        if len(times) <= step and len(times) * self.vertices <= MAX_VERTICES_ALONE:
+        if 0 < len(times) <= step and len(times) * self.vertices <= MAX_VERTICES_ALONE:
             yield self._finish(0, self._start(sampler.posed(times), None))
             progress(len(times))
             return

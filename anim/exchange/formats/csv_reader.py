@@ -38,8 +38,9 @@ from anim.arrays import Floats
 from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import PartialConvention, merge_strict, parse_convention, require_complete
-from anim.exchange.euler.curve import DEFAULT_WEIGHT, MODES, Curve, Mode, uniform_modes
+from anim.exchange.euler.curve import MODES, Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import Convention, EulerMotion
+from anim.exchange.formats.csv_keys import KeyRow, curve_from_rows
 from anim.exchange.formats.csv_writer import EXTRA_COLUMNS, KEY_COLUMNS, write
 from anim.exchange.formats.node_builder import KINDS, MAX_UNIT_M, NodeBuilder, build_nodes, check_nodes
 from anim.exchange.formats.text import (
@@ -54,7 +55,6 @@ from anim.exchange.formats.text import (
 from anim.model import TimeAxis
 
 __all__ = ["read", "write"]
-KeyRow = tuple[int, dict[str, str]]  # line, cells by column
 LINE = re.compile(r"[^\n]*\n|[^\n]+")  # io.StringIO takes four bytes a character
 
 
@@ -273,45 +273,3 @@ def _read_keys(file: _File, drafts: _NodeBuilders, later: float) -> None:
         found.setdefault((draft.name, slot), []).append((line, row))
     for (name, slot), rows in found.items():
         check_nodes(drafts.named(name), slot, partial(curve_from_rows, rows, later))
-
-
-def curve_from_rows(rows: list[KeyRow], later: float, unit: float) -> Curve:
-    """Return the curve of one channel's rows, shifted by `later` seconds, its values multiplied by `unit`."""
-    lines = [line for line, _ in rows]
-    times = np.array([parse_cell(row["time"], line, "time") for line, row in rows])
-    check_times(times, lines)
-    axis = TimeAxis(times + later)
-    values = np.array([parse_cell(row["value"], line, "value") for line, row in rows]) * unit
-    modes = np.zeros(len(rows), np.uint8)
-    for i, (line, row) in enumerate(rows):
-        word = row.get("interpolation") or "linear"
-        if word not in MODES:
-            raise error_at(line, f"interpolation is '{word}' (expected {', '.join(MODES)})")
-        modes[i] = MODES[word]
-    if not (modes == Mode.CUBIC).any():
-        return Curve(axis, values, modes)
-    _check_tangents(rows, modes.tolist())
-    arriving, leaving = (_handles(rows, key, 0.0) * unit for key in ("in_tangent", "out_tangent"))
-    return Curve(axis, values, modes, arriving, leaving, _weights(rows, "in_weight"), _weights(rows, "out_weight"))
-
-
-def _check_tangents(rows: list[KeyRow], modes: list[int]) -> None:
-    """Check the tangents at both ends of each cubic segment."""
-    for mode, *ends in zip(modes, rows, rows[1:], strict=False):
-        for (line, row), key in zip(ends, ("out_tangent", "in_tangent"), strict=True):
-            if mode == Mode.CUBIC and not row.get(key):
-                raise error_at(line, f"a cubic piece lacks its {key} (expected the change of the value per second)")
-
-
-def _handles(rows: list[KeyRow], key: str, otherwise: float) -> Floats:
-    return np.array([parse_cell(row[key], line, key) if row.get(key) else otherwise for line, row in rows])
-
-
-def _weights(rows: list[KeyRow], key: str) -> Floats | None:
-    if not any(row.get(key) for _, row in rows):
-        return None
-    weights = _handles(rows, key, DEFAULT_WEIGHT)
-    for (line, _), weight in zip(rows, weights.tolist(), strict=True):
-        if not 0 <= weight <= 1:
-            raise error_at(line, f"{key} is {weight:g} (expected a share of the time between two keys, 0 … 1)")
-    return weights

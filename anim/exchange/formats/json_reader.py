@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats
+from anim.arrays import Floats, freeze
 from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import (
@@ -81,7 +81,7 @@ KNOWN_KEYS: dict[tuple[str, ...], frozenset[str]] = {
     keys: frozenset(keys) for keys in (FILE_KEYS, NODE_KEYS, CURVE_KEYS)
 }
 PIVOT_KEYS = frozenset((*OFFSETS, *PIVOT_ROTATIONS))
-NOTHING, ORIGIN, UNSCALED = np.zeros(0), np.zeros(3), np.ones(3)
+NOTHING, ORIGIN, UNSCALED = freeze(np.zeros(0)), freeze(np.zeros(3)), freeze(np.ones(3))
 
 
 def read(data: bytes, options: PartialConvention) -> EulerMotion:
