@@ -53,14 +53,14 @@ def bake_jobs(output: str, ending: str, groups: Sequence[MeshGroup], clips: Sequ
 
 def _check_files(files: Sequence[str], ending: str) -> None:
     """Raise UsageError or OutputError for a file that can't be written; of new ones the first of each folder tells."""
-    sound: set[tuple[str, str]] = set()  # folders and file extensions of new files
+    checked: set[tuple[str, str]] = set()  # folders and file extensions of new files
     for file in files:
         key = os.path.dirname(file), os.path.splitext(file)[1]
         is_new = bool(file) and file != documents.PIPE and _is_missing(file)
-        if not (is_new and key in sound):
+        if not (is_new and key in checked):
             cache_files.check(file, ending, placeholders=None)
         if is_new:
-            sound.add(key)
+            checked.add(key)
 
 
 def _is_missing(file: str) -> bool:

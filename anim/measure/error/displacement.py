@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 
 CHUNK = 1_000_000  # vertices × frames per step: 24 MB
-PART = 250_000  # of the same, of one group with many vertices
+MAX_GROUP_VALUES = 250_000  # of the same, of one group with many vertices
 FIRST = 8  # frames evaluated before the bounds of the others are updated
 
 
@@ -77,7 +77,7 @@ class SkinnedDisplacement:
     def lengths(self, group: int, frames: Ints) -> Floats:
         """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
         products = self._groups.products[group]
-        parts = np.array_split(products, len(products) * len(frames) // PART + 1)
+        parts = np.array_split(products, len(products) * len(frames) // MAX_GROUP_VALUES + 1)
         return np.concatenate([_lengths(self._products(part, group, frames)) for part in parts])
 
     def _products(self, products: Floats, group: int, frames: Ints) -> Floats:
