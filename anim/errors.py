@@ -19,8 +19,9 @@ from typing import Any, Self
 
 _NO_MEMORY = (
     "cannot allocate memory",
-    "failed to map segment",
-)  # of the system's loader
+    "failed to map segment",  # of the system's loader
+    "can't start new thread",
+)
 
 
 class AnimError(Exception):
@@ -126,7 +127,7 @@ def is_out_of_memory(error: BaseException | None) -> bool:
         words = str(error).lower()
         if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
             return True
-        if isinstance(error, (OSError, ImportError)) and any(each in words for each in _NO_MEMORY):
+        if isinstance(error, (OSError, ImportError, RuntimeError)) and any(each in words for each in _NO_MEMORY):
             return True
         error = error.__cause__ or error.__context__
     return False

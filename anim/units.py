@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Callable
 
 from anim.errors import RangeError
@@ -78,10 +79,10 @@ def parse_angle(text: str, name: str) -> float:
 def parse_size(text: str, name: str) -> int:
     """Return a number of bytes above 0: "800kB", "1.5 MB", "65536". Raises RangeError otherwise."""
     value, unit = _split(text.lower(), name) if re.fullmatch(_NUMBER, text.lower()) else (0.0, "")
-    size = int(value * BYTES_PER_UNIT.get(unit, 0))
-    if size <= 0:
+    size = min(value * BYTES_PER_UNIT.get(unit, 0), sys.maxsize)
+    if size < 1:
         raise RangeError(f"{name} is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
-    return size
+    return int(size)
 
 
 def _split(text: str, name: str) -> tuple[float, str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from anim.units import format_number
 from cli.streams import step_streams
-from cli.tables import cut_middle
+from cli.tables import cut_middle, escape_control
 
 MAX_LINE_LENGTH = 1000  # characters of a message: names in a file can have any length
 MIN_PERCENT = 1e-4
@@ -30,7 +30,7 @@ class Reporter:
     def info(self, line: str) -> None:
         """Write a line to stderr, cut if very long, unless quiet."""
         if not self.quiet:
-            self._write("\n".join(cut_middle(each, MAX_LINE_LENGTH) for each in line.split("\n")))
+            self._write("\n".join(escape_control(cut_middle(each, MAX_LINE_LENGTH)) for each in line.split("\n")))
 
     def _write(self, line: str) -> None:
         if (step := step_streams()) is not None:

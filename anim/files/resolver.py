@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from anim.arrays import Bytes
 from anim.errors import FormatError
+
+GLB_MAGIC = b"glTF"
 
 
 class CompanionFiles:
@@ -25,7 +29,9 @@ class CompanionFiles:
         return self._files[address]
 
 
-def read_file(path: Path, ending: str = ".glb") -> Bytes:
+def read_file(
+    path: Path, ending: str = ".glb", *, read: Callable[[io.BufferedReader], bytes] = io.BufferedReader.read
+) -> Bytes:
     """Return the bytes of a file, read-only. ending: expected extension, for the hint about a folder.
 
     A copy instead of a memory map: the system kills a process whose mapped file is rewritten in place by another.
@@ -34,9 +40,17 @@ def read_file(path: Path, ending: str = ".glb") -> Bytes:
         if path.is_dir():
             raise FormatError("is a folder", help=_in_folder(path, ending))
         with path.open("rb") as file:
-            return np.frombuffer(file.read(), np.uint8)
+            return np.frombuffer(read(file), np.uint8)
     except OSError as error:
         raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
+
+
+def read_gltf(file: io.BufferedReader) -> bytes:
+    """Return all bytes of an open file; of what can't be a glTF only the first ones: a device may never end."""
+    head = file.peek()
+    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    is_gltf = head[: len(GLB_MAGIC)] == GLB_MAGIC[: len(head)] or text[:1] in (b"{", b"")
+    return file.read() if is_gltf else head
 
 
 def _in_folder(folder: Path, ending: str) -> str:

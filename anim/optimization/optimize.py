@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from anim.errors import DataRangeError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.equal_clips import first_equal
+from anim.measure.error.sample_times import FPS
 from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimization import writing
@@ -21,6 +23,7 @@ from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification
 from anim.optimization.writing import changed_clips, write_solutions
+from anim.sampling.times import MAX_FRAMES
 
 SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
 
@@ -72,6 +75,7 @@ def optimize(
     options = f"{request.name} {tuple(chosen)}"
     if writing.has_mark(document, clips, options):
         return Optimized(document, {}, {}, unchanged=True)
+    _check_durations(clips, chosen)
     request = _visible_clips(request, scene)
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
     after = base.scene if base else scene
@@ -133,3 +137,12 @@ def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, T
         at_rest = shared.at_rest(i, max_error)
         tasks.append((i, Task(clip, values, unused, SEARCH_BOUND_FRACTION * max_error, at_rest)))
     return tasks
+
+
+def _check_durations(clips: Sequence[Clip], chosen: Sequence[int]) -> None:
+    """Raise DataRangeError for a clip that lasts too long to measure between keys, as `frame_times` does."""
+    for number in chosen:
+        frames = clips[number].end * FPS
+        if frames > MAX_FRAMES:
+            where = reader.clip_label(clips[number].name, number)
+            raise DataRangeError(f"{frames:.3g} frames at {FPS:g} fps (limit {MAX_FRAMES})", where=where)

@@ -7,9 +7,10 @@ No other module opens a path, except `cli.io.cache_folders` for streams, and in 
 from __future__ import annotations
 
 import difflib
+import io
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 
@@ -47,7 +48,7 @@ def source(path: str, reporter: Reporter = AUDIBLE, opener: Opener = container.r
     """
     name = called(path)
     try:
-        found = open_bytes(_stdin(), name, opener) if path == PIPE else _open_file(path, opener)
+        found = open_bytes(_stdin(resolver.read_gltf), name, opener) if path == PIPE else _open_file(path, opener)
         repaired_note(found.document, name, reporter)
         yield found
     except (UsageError, OutputError):
@@ -239,14 +240,15 @@ def _read_file(path: str, ending: str) -> Bytes:
     return found
 
 
-def _stdin() -> Bytes:
+def _stdin(read: Callable[[io.BufferedReader], bytes] = io.BufferedReader.read) -> Bytes:
     if (step := step_streams()) is not None:
         return step.input
     if sys.stdin is None:
         raise UsageError("stdin is closed: name a file, or pipe a GLB into stdin")
     if sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a GLB into stdin")
-    return np.frombuffer(sys.stdin.buffer.read(), np.uint8)
+    buffer = sys.stdin.buffer
+    return np.frombuffer(read(buffer) if isinstance(buffer, io.BufferedReader) else buffer.read(), np.uint8)
 
 
 def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str, str]]:

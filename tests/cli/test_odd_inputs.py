@@ -236,3 +236,29 @@ def test_angles_of_many_thousand_turns_are_refused(call: Call, tmp_path: Path) -
     done = call("from-euler", str(curves), str(tmp_path / "out.glb"), *options)
     assert done.code == 3
     assert "needs over 500000 keys" in done.err
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no /dev/zero")
+@pytest.mark.parametrize("line", ["inspect /dev/zero", "inspect < /dev/zero", "optimize /dev/urandom out.glb"])
+def test_what_never_ends_is_no_gltf(line: str, tmp_path: Path) -> None:
+    assert "is no glTF" in refusal(shell(f"ulimit -v 4000000; gltf-anim {line}", tmp_path), 3)
+
+
+def test_a_clip_that_is_too_long_to_measure_is_named(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "a.gltf"
+    path.write_bytes(text(animated(times=[0, 1e6])))
+    assert "frames at 120 fps (limit 10000000)" in refusal(call("optimize", path, tmp_path / "out.glb"), 3)
+
+
+def test_control_characters_of_names_are_escaped_in_summaries(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "a.gltf"
+    clip = {**animated(times=[0, 1])["animations"][0], "name": "\x1b[31mred\x07"}
+    path.write_bytes(text({**animated(times=[0, 1]), "animations": [clip]}))
+    run = call("trim", path, tmp_path / "out.glb", "--to", "0.5")
+    assert run.code == 0, run.err
+    assert "'\\x1b[31mred\\x07'" in run.err
+    assert "\x1b" not in run.err
+
+
+def test_a_size_beyond_all_files_is_no_limit(walk: Path, call: Call, tmp_path: Path) -> None:
+    call("optimize", walk, tmp_path / "out.glb", "--effort", "fast", "--max-bytes", "1e300GB").product()

@@ -59,7 +59,7 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     real = resolver.resolve_links(Path(path))
     for _ in range(MAX_OPEN_ATTEMPTS):
         before = _stamp(real)
-        data, buffers = resolver.read_file(real), resolver.CompanionFiles(real.parent)
+        data, buffers = resolver.read_file(real, read=resolver.read_gltf), resolver.CompanionFiles(real.parent)
         document = opener(data, buffers.open)
         outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
         for address in outside:
