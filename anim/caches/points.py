@@ -53,9 +53,10 @@ def _write_npz(points: PointCache, outputs: Outputs, fps: float) -> None:
 
 def _write_usd(points: PointCache, outputs: Outputs, fps: float) -> None:
     usd, geom, vt = package()
-    from pxr import Sdf
+    from pxr import Sdf, Tf
 
-    with temporary_files.temp_output(outputs, outputs.main, outputs.main[-5:]) as path:
+    ending, failures = outputs.main[-5:], (Tf.ErrorException,)
+    with temporary_files.temp_output(outputs, outputs.main, ending, failures=failures) as path:
         stage = usd.Stage.CreateNew(path)
         geom.SetStageUpAxis(stage, geom.Tokens.y)
         geom.SetStageMetersPerUnit(stage, 1.0)

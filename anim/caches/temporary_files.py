@@ -15,20 +15,20 @@ from anim.errors import OutputError
 
 
 @contextmanager
-def temp_output(outputs: Outputs, name: str, ending: str) -> Iterator[str]:
+def temp_output(
+    outputs: Outputs, name: str, ending: str, *, failures: tuple[type[Exception], ...] = ()
+) -> Iterator[str]:
     """Yield a path of this extension to write to; its content becomes the output `name`.
 
-    Raises OutputError if the package can't write there.
+    failures: errors of the package that writes there, which become an OutputError.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"output{ending}"
         try:
             yield str(path)
-        except (RecursionError, NotImplementedError):
-            raise
-        except RuntimeError as error:  # of native packages, which hide the reason or spread it over many lines
+        except failures:  # their words hide the reason, or spread it over many lines
             help = f"is there room for temporary files in {tempfile.gettempdir()}? TMPDIR names another folder"
-            raise OutputError(f"{name}: can't be written as {ending} in a temporary file", help=help) from error
+            raise OutputError(f"{name}: can't be written as {ending} in a temporary file", help=help) from None
         with path.open("rb") as source, outputs.create(name) as target:
             shutil.copyfileobj(source, target, COPY_BYTES)
 

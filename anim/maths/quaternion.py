@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 
 SMALL_SINE = 1e-8  # below this |xyz| the angle equals its sine in float64
@@ -112,14 +112,18 @@ def angle_between(a: Floats, b: Floats) -> Floats:
     return np.asarray(4 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
 
-def align_signs(q: Floats) -> Floats:
+def align_signs(q: Floats, series: Ints | None = None) -> Floats:
     """Return q (K, ..., 4) with signs flipped along the first axis so that neighbors have dot ≥ 0.
 
-    The first key keeps its sign, and so does a key orthogonal to its neighbor.
+    The first key keeps its sign, and so does a key orthogonal to its neighbor. series: (K,) number of the series that
+    each key belongs to, of series after each other: each is aligned alone.
     align_signs([[0, 0, 0, 1], [0, 0, 0, −1]]) → [[0, 0, 0, 1], [0, 0, 0, 1]]
     """
     signs = np.ones(q.shape[:-1])
     signs[1:] = np.cumprod(np.where(dot(q[1:], q[:-1]) < 0, -1.0, 1.0), axis=0)
+    if series is not None:
+        starts = np.flatnonzero(np.diff(series, prepend=-1))
+        signs = signs * np.repeat(signs[starts], np.diff(starts, append=len(q)), axis=0)
     return np.asarray(q * signs[..., None])
 
 

@@ -19,19 +19,15 @@ from anim.arrays import Floats, Ints
 from anim.maths import euler, hierarchy
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
-from anim.measure.inspect import storage_cost
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import optimize as optimization
 from anim.sampling.pose import PoseSampler
-from anim.show.plots import polylines, track_selection
-from anim.skinning import chunk_pipeline
 from anim.skinning.analysis import collapse as collapse_analysis
-from anim.skinning.analysis.inbetween_error import InbetweenMetric
-from cli.io import documents
 from cli.workflows import mesh_pairs
 from fixtures.broken.pieces import buffered, text
 from tests import many
+from tests.calls import count_calls
 from tests.cli.conftest import Call
 from tests.cli.running import refusal
 from tests.files import clips_of, opened_path
@@ -104,7 +100,7 @@ def test_equal_clips_are_measured_once(
     path = tmp_path / "in.gltf"
     path.write_bytes(equal_clips(CLIPS))
     names = {"OUT": str(tmp_path / "out.glb"), "IN": str(path)}
-    counted = _count_calls(monkeypatch, Prover, "certified")
+    counted = count_calls(monkeypatch, Prover, "certified")
     call(line[0], path, *(names.get(each, each) for each in line[1:])).product()
     assert len(counted) == 1
 
@@ -114,7 +110,7 @@ def test_equal_loops_are_analyzed_once(
     options: list[str], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "in.gltf").write_bytes(equal_clips(CLIPS))
-    counted = _count_calls(monkeypatch, loop_analysis, "_judge")
+    counted = count_calls(monkeypatch, loop_analysis, "_judge")
     line = [str(tmp_path / "out.glb") if each == "OUT" else each for each in options]
     call("loop", tmp_path / "in.gltf", *line).product()
     assert len(counted) == 1
@@ -133,7 +129,7 @@ def test_equal_clips_are_optimized_once(call: Call, tmp_path: Path, monkeypatch:
     ]
     path = tmp_path / "in.gltf"
     path.write_bytes(text({"nodes": [{"name": "n"}], **keys, "animations": clips}))
-    counted = _count_calls(monkeypatch, optimization, "optimize_clip")
+    counted = count_calls(monkeypatch, optimization, "optimize_clip")
     call("optimize", path, tmp_path / "out.glb", "--max-error", "1mm", "--jobs", "1").product()
     assert len(counted) == 2
     found = clips_of((tmp_path / "out.glb").read_bytes())
@@ -158,19 +154,6 @@ def test_a_plot_takes_the_span_of_a_clip_once(call: Call, tmp_path: Path, monkey
     monkeypatch.setattr(Clip, "time_axes", property(called))
     call("plot", tmp_path / "in.gltf", tmp_path / "out.png").product()
     assert len(counted) < 10
-
-
-def _count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[None]:
-    """Count the calls of a function from now on, in a list that grows with each."""
-    counted: list[None] = []
-    function = getattr(owner, name)
-
-    def called(*args: object, **options: object) -> object:
-        counted.append(None)
-        return function(*args, **options)
-
-    monkeypatch.setattr(owner, name, called)
-    return counted
 
 
 def test_every_equal_clip_is_changed_and_listed(call: Call, tmp_path: Path) -> None:
@@ -208,7 +191,7 @@ def test_a_deep_chain_of_moving_nodes_is_not_refined(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Bounds of derivatives grow with the depth's square: samples between the frames would only take time."""
-    counted = _count_calls(monkeypatch, ErrorMetric, "posed")
+    counted = count_calls(monkeypatch, ErrorMetric, "posed")
     paths = []
     for count in (20, 300):
         (tmp_path / f"{count}.glb").write_bytes(many.chain_open(count))
@@ -235,7 +218,7 @@ def test_a_bvh_of_a_long_chain_is_as_long_as_the_chain(call: Call, tmp_path: Pat
 def test_a_bvh_computes_angles_of_many_nodes_at_once(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    counted = _count_calls(monkeypatch, euler, "unwrap")
+    counted = count_calls(monkeypatch, euler, "unwrap")
     (tmp_path / "in.glb").write_bytes(many.side_moving(500))
     call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh", "--clip", "#0").product()
     assert 0 < len(counted) < 5
@@ -267,14 +250,14 @@ def test_skins_are_reported_by_their_own_meshes(call: Call, tmp_path: Path) -> N
 
 def test_meshes_of_two_files_are_paired_by_tables(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "in.glb").write_bytes(many.skins(100))
-    counted = _count_calls(monkeypatch, mesh_pairs, "node_name")
+    counted = count_calls(monkeypatch, mesh_pairs, "node_name")
     call("diff", tmp_path / "in.glb", tmp_path / "in.glb").product()
     assert 0 < len(counted) <= 4 * 100
 
 
 def test_equal_skinned_meshes_are_compared_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "in.glb").write_bytes(many.skins(3))
-    counted = _count_calls(monkeypatch, collapse_analysis, "bind_measures")
+    counted = count_calls(monkeypatch, collapse_analysis, "bind_measures")
     report = call("collapse", tmp_path / "in.glb", "--format", "json").json
     assert len(counted) == 1
     meshes = report["clips"][0]["meshes"]
@@ -289,84 +272,8 @@ def test_skinned_meshes_share_the_poses_of_the_skeleton(
     sizes = []
     for count in (2, 6):
         (tmp_path / "in.glb").write_bytes(many.skins_different(count))
-        counted = _count_calls(monkeypatch, PoseSampler, "at_each")
+        counted = count_calls(monkeypatch, PoseSampler, "at_each")
         call("collapse", tmp_path / "in.glb").product()
         sizes.append(len(counted))
         monkeypatch.undo()
     assert sizes[0] == sizes[1] > 0
-
-
-def test_a_plot_computes_each_curve_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the number of its components, which each ask for their color."""
-    pytest.importorskip("matplotlib")
-    (tmp_path / "in.glb").write_bytes(many.targets(20))
-    curves, speeds = (_count_calls(monkeypatch, polylines, name) for name in ("value_line", "speed_line"))
-    call("plot", tmp_path / "in.glb", tmp_path / "out.png").product()
-    assert (len(curves), len(speeds)) == (1, 1)
-
-
-def test_a_plot_of_many_tracks_prepares_those_that_it_draws(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("matplotlib")
-    (tmp_path / "in.glb").write_bytes(many.channels(1000))
-    counted = _count_calls(monkeypatch, track_selection, "PlotTrack")
-    said = call("plot", tmp_path / "in.glb", tmp_path / "out.png", "--limit", "2")
-    said.product()
-    assert "drew the first 2 of 1000 tracks that move" in said.err
-    assert len(counted) == 2
-
-
-def test_files_of_many_clips_are_checked_by_their_folder(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Those that are there already are checked one by one."""
-    (tmp_path / "in.glb").write_bytes(morphing_clips(CLIPS))
-    (tmp_path / "c7.npz").mkdir()
-    counted = _count_calls(monkeypatch, documents, "check_file")
-    assert "c7.npz: is a folder" in refusal(call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz"), 2)
-    assert len(counted) == 3  # the pattern, c0, c7
-    (tmp_path / "c7.npz").rmdir()
-    (tmp_path / "c8.npz").write_bytes(b"")
-    counted.clear()
-    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz").product()
-    assert len(counted) == 3
-    assert len(list(tmp_path.glob("c*.npz"))) == CLIPS
-
-
-def test_small_bakes_start_no_threads_and_measure_equal_clips_once(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "in.glb").write_bytes(morphing_clips(5))
-    measured = _count_calls(monkeypatch, InbetweenMetric, "largest_error")
-    pools = _count_calls(monkeypatch, chunk_pipeline, "ThreadPoolExecutor")
-    run = call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2")
-    run.product()
-    assert "(5 clips are affected)" in run.err
-    assert (len(measured), len(pools)) == (1, 0)
-    alone = [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)]
-    monkeypatch.setattr(chunk_pipeline, "MAX_VERTICES_ALONE", 0)
-    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2").product()
-    assert len(pools) > 0
-    assert [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)] == alone
-
-
-def morphing_clips(count: int) -> bytes:
-    """Equal clips of a node with a morphing mesh, which is baked."""
-    document = json.loads(many.clips_equal(count)[20:].rstrip(b"\0 "))
-    targets = {**many.MESH["primitives"][0], "targets": [{"POSITION": 2}]}
-    return text({**document, "meshes": [{"primitives": [targets], "weights": [0.5]}]})
-
-
-def test_accessors_that_clips_share_are_described_once(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Beyond them each clip has its own JSON only."""
-    (tmp_path / "in.gltf").write_bytes(equal_clips(CLIPS))
-    counted = _count_calls(monkeypatch, storage_cost, "_text")
-    report = call("inspect", tmp_path / "in.gltf", "--format", "json").json["files"][0]
-    assert len(counted) < CLIPS + 10
-    costs = [each["json_bytes"] for each in report["clips"]]
-    shared = report["clips"][0]["json_bytes"] * CLIPS - report["animation_json_bytes"]
-    assert costs[0] < costs[-1] == costs[0] + len("c299") - len("c0")
-    assert shared > 0

@@ -15,20 +15,8 @@ from anim.exchange.formats import csv_reader, json_reader
 from anim.maths import euler
 from anim.maths.euler import AxesConvention
 from tests import many
+from tests.calls import count_calls
 from tests.cli.conftest import Call
-
-
-def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[None]:
-    """Count the calls of a function from now on, in a list that grows with each."""
-    counted: list[None] = []
-    function = getattr(owner, name)
-
-    def called(*args: object, **options: object) -> object:
-        counted.append(None)
-        return function(*args, **options)
-
-    monkeypatch.setattr(owner, name, called)
-    return counted
 
 
 @pytest.mark.parametrize(("make", "suffix"), [(many.json_curves, ".json"), (many.csv_columns, ".csv")])

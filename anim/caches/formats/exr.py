@@ -18,7 +18,7 @@ def write(pixels: AnyArray, outputs: Outputs, name: str) -> None:
     """Write pixels (height, width, 3), float32 or float16, as R, G, B; losslessly compressed (ZIP)."""
     package = _package()
     header = {"compression": package.ZIP_COMPRESSION, "type": package.scanlineimage}
-    with temporary_files.temp_output(outputs, name, ".exr") as path:
+    with temporary_files.temp_output(outputs, name, ".exr", failures=(RuntimeError,)) as path:
         package.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(path)
 
 

@@ -36,6 +36,8 @@ def write_stage(outputs: Outputs, ending: str, name: str, build: Callable[[Any, 
     images are beside it. build: keeps no reference to the stage. Raises UnsupportedError without usd-core.
     """
     usd, _, _ = package()
+    from pxr import Tf
+
     images: list[tuple[str, bytes]] = []
 
     def save_image(number: int, kind: str, data: bytes) -> str:
@@ -43,7 +45,7 @@ def write_stage(outputs: Outputs, ending: str, name: str, build: Callable[[Any, 
         images.append((own if ending == ".usdz" else companion_name(outputs.main, f"-{own}"), data))
         return images[-1][0] if ending == ".usdz" else f"./{images[-1][0]}"
 
-    with temporary_files.temp_output(outputs, outputs.main, ending) as path:
+    with temporary_files.temp_output(outputs, outputs.main, ending, failures=(Tf.ErrorException,)) as path:
         binary = path if ending == ".usdc" else f"{path}.usdc"
         stage = usd.Stage.CreateNew(binary)
         result = build(stage, save_image)

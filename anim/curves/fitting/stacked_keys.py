@@ -71,15 +71,7 @@ def fit_linear_keys(stack: MotionStack, motion: Ints, knots: Floats, *, toleranc
     motion = np.insert(motion, jumps + 1, motion[jumps])
     times = np.insert(times, jumps + 1, earlier[jumps])
     values = np.insert(values, jumps + 1, arriving[jumps], axis=0)
-    return StackedKeys(motion, times, align_signs(motion, values) if stack.rotation else values)
-
-
-def align_signs(motion: Ints, values: Floats) -> Floats:
-    """Return quaternions (K, 4) with the signs that `quaternion.align_signs` gives each motion (K,) alone."""
-    flips = np.where(quaternion.dot(values[1:], values[:-1]) < 0, -1.0, 1.0)
-    signs = np.ones(len(values))
-    signs[1:] = np.cumprod(np.where(motion[1:] == motion[:-1], flips, 1.0))
-    return np.asarray(values * (signs * signs[_first(motion)])[:, None])
+    return StackedKeys(motion, times, quaternion.align_signs(values, motion) if stack.rotation else values)
 
 
 def distinct_times(motion: Ints, times: Floats) -> tuple[Ints, Floats]:

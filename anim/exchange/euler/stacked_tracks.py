@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Bools, Floats, freeze
-from anim.curves.fitting.stacked_keys import MotionStack, StackedKeys, align_signs, fit_linear_keys
+from anim.curves.fitting.stacked_keys import MotionStack, StackedKeys, fit_linear_keys
 from anim.exchange.euler.baked_keys import curves_of
 from anim.exchange.euler.motion import NO_PIVOTS, EulerNode
 from anim.exchange.euler.node_stack import PATHS, NodeStack
+from anim.maths import quaternion
 from anim.maths.euler import AxesConvention
 from anim.model import Interpolation
 
@@ -67,7 +68,7 @@ def _path_keys(stack: NodeStack, path: str, sampled: Bools, tolerance: float) ->
     if at_knots.any():
         part, times = node[at_knots], knots[at_knots]
         values = stack.values(path, part, times, False)
-        values = align_signs(part, values) if path == "rotation" else values
+        values = quaternion.align_signs(values, part) if path == "rotation" else values
         yield from _by_node(StackedKeys(part, times, values), stepped)
     if not at_knots.all():
         motions = MotionStack(

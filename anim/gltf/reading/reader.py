@@ -95,16 +95,15 @@ def names(document: Document) -> tuple[str, ...]:
 def scene(
     document: Document,
     accessors: Accessors | None = None,
-    known: Skeleton | None = None,
+    skeleton: Skeleton | None = None,
     *,
     normals: bool = False,
     tangents: bool = False,
 ) -> Scene:
     """Return the skeleton and its meshes, nodes depth-first in the order of the file's scenes.
 
-    known: the document's skeleton, if the caller has it. normals, tangents: read those of vertices and morph targets
-    too. A mesh with EXT_mesh_gpu_instancing is included
-    once, on its node (`instanced_nodes`).
+    skeleton: the document's, if the caller has it. normals, tangents: read those of vertices and morph targets too.
+    A mesh with EXT_mesh_gpu_instancing is included once, on its node (`instanced_nodes`).
     Raises UnsupportedError if vertices cannot be read: Draco without the package DracoPy, an unknown compression,
     EXT_mesh_gpu_instancing where the file requires it.
     """
@@ -116,7 +115,7 @@ def scene(
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     nodes = json_array(document.json, "nodes")
     instances = []
-    parents = hierarchy.parents(document.json) if known is None else known.parents.tolist()
+    parents = hierarchy.parents(document.json) if skeleton is None else skeleton.parents.tolist()
     for number in depth_first(document.json, parents):
         node = nodes[number]
         if "mesh" not in node:
@@ -124,7 +123,7 @@ def scene(
         skin = skins[node["skin"]] if "skin" in node else None
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
-    return Scene(_skeleton(document, parents) if known is None else known, tuple(instances))
+    return Scene(_skeleton(document, parents) if skeleton is None else skeleton, tuple(instances))
 
 
 def skins(document: Document) -> tuple[tuple[int, Skin], ...]:

@@ -29,22 +29,14 @@ def _is_moving(group: ConcatenatedTracks) -> Bools:
     values = group.values
     if group.kind is ValueKind.ROTATION:
         tolerance = np.full(len(group.tracks), CONSTANT_TOLERANCE)
-        values = values if group.interpolation is Interpolation.CUBICSPLINE else _align_signs(group)
+        if group.interpolation is not Interpolation.CUBICSPLINE:
+            values = quaternion.align_signs(values, np.repeat(np.arange(len(group.tracks)), group.counts))
     else:
         tolerance = CONSTANT_TOLERANCE * np.maximum(_largest(group, values), 1e-30)
     moving = _largest(group, values - np.repeat(values[group.starts], group.counts, axis=0)) > tolerance
     for each in group.tangents or ():
         moving |= (_largest(group, each) > tolerance) & (group.counts > 1)
     return np.asarray(moving)
-
-
-def _align_signs(group: ConcatenatedTracks) -> Floats:
-    """The rotations with signs aligned in each track, up to one sign of the whole track."""
-    flips = quaternion.dot(group.values[1:], group.values[:-1]) < 0
-    flips[group.starts[1:] - 1] = False
-    signs = np.ones(len(group.values))
-    signs[1:] = np.cumprod(np.where(flips, -1.0, 1.0))
-    return np.asarray(group.values * signs[:, None])
 
 
 def _largest(group: ConcatenatedTracks, values: Floats) -> Floats:

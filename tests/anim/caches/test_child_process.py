@@ -15,6 +15,8 @@ import pytest
 
 from anim.caches.child_process import ChildEndedError, run_in_child
 from anim.errors import FormatError, UnsupportedError
+from anim.model import FrameChunk, VertexCache
+from tests.anim.caches.making import written
 
 GB = 10**9
 
@@ -140,3 +142,17 @@ def test_the_child_ends_with_the_block(tmp_path: Path) -> None:
         os.kill(child, 0)
     with pytest.raises(ProcessLookupError):
         os.kill(child, 0)
+
+
+@pytest.mark.parametrize("ending", ["usdc", "abc"])
+def test_errors_of_ours_are_not_taken_for_a_full_folder(ending: str) -> None:
+    """As of a child that reads the frames while a package writes them."""
+    pytest.importorskip({"usdc": "pxr", "abc": "alembic3d"}[ending])
+
+    def frames() -> Iterator[FrameChunk]:
+        raise RuntimeError("of ours")
+        yield
+
+    cache = VertexCache(np.arange(2.0), 3, np.array([[0, 1, 2]]), frames)
+    with pytest.raises(RuntimeError, match="of ours"):
+        written(cache, f"a.{ending}")

@@ -157,3 +157,12 @@ def test_slerp_stays_unit_and_divides_the_angle(a: Floats, b: Floats, u: float) 
     between = quat.slerp(a, b, u)
     assert np.linalg.norm(between) == pytest.approx(1, abs=1e-14)
     assert float(quat.angle_between(a, between)) == pytest.approx(u * float(quat.angle_between(a, b)), abs=1e-13)
+
+
+def test_series_are_aligned_alone() -> None:
+    random = np.random.default_rng(7)
+    series = np.repeat([0, 1, 2, 5], [3, 1, 6, 4])
+    keys = quat.normalize(random.normal(size=(len(series), 4)))
+    alone = np.concatenate([quat.align_signs(keys[series == number]) for number in np.unique(series)])
+    np.testing.assert_array_equal(quat.align_signs(keys, series), alone)
+    assert quat.align_signs(np.zeros((0, 4)), np.zeros(0, np.int64)).shape == (0, 4)

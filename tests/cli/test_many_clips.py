@@ -1,0 +1,96 @@
+"""Files of many clips and tracks: what they share is computed once, counted by calls."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from anim.measure.inspect import storage_cost
+from anim.show.plots import polylines, track_selection
+from anim.skinning import chunk_pipeline
+from anim.skinning.analysis.inbetween_error import InbetweenMetric
+from cli.io import documents
+from fixtures.broken.pieces import text
+from tests import many
+from tests.calls import count_calls
+from tests.cli.conftest import Call
+from tests.cli.running import refusal
+from tests.cli.test_many import CLIPS, equal_clips
+
+
+def test_a_plot_computes_each_curve_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the number of its components, which each ask for their color."""
+    pytest.importorskip("matplotlib")
+    (tmp_path / "in.glb").write_bytes(many.targets(20))
+    curves, speeds = (count_calls(monkeypatch, polylines, name) for name in ("value_line", "speed_line"))
+    call("plot", tmp_path / "in.glb", tmp_path / "out.png").product()
+    assert (len(curves), len(speeds)) == (1, 1)
+
+
+def test_a_plot_of_many_tracks_prepares_those_that_it_draws(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    (tmp_path / "in.glb").write_bytes(many.channels(1000))
+    counted = count_calls(monkeypatch, track_selection, "PlotTrack")
+    said = call("plot", tmp_path / "in.glb", tmp_path / "out.png", "--limit", "2")
+    said.product()
+    assert "drew the first 2 of 1000 tracks that move" in said.err
+    assert len(counted) == 2
+
+
+def test_files_of_many_clips_are_checked_by_their_folder(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that are there already are checked one by one."""
+    (tmp_path / "in.glb").write_bytes(morphing_clips(CLIPS))
+    (tmp_path / "c7.npz").mkdir()
+    counted = count_calls(monkeypatch, documents, "check_file")
+    assert "c7.npz: is a folder" in refusal(call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz"), 2)
+    assert len(counted) == 3  # the pattern, c0, c7
+    (tmp_path / "c7.npz").rmdir()
+    (tmp_path / "c8.npz").write_bytes(b"")
+    counted.clear()
+    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz").product()
+    assert len(counted) == 3
+    assert len(list(tmp_path.glob("c*.npz"))) == CLIPS
+
+
+def test_small_bakes_start_no_threads_and_measure_equal_clips_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(morphing_clips(5))
+    measured = count_calls(monkeypatch, InbetweenMetric, "largest_error")
+    pools = count_calls(monkeypatch, chunk_pipeline, "ThreadPoolExecutor")
+    run = call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2")
+    run.product()
+    assert "(5 clips are affected)" in run.err
+    assert (len(measured), len(pools)) == (1, 0)
+    alone = [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)]
+    monkeypatch.setattr(chunk_pipeline, "MAX_VERTICES_ALONE", 0)
+    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2").product()
+    assert len(pools) > 0
+    assert [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)] == alone
+
+
+def morphing_clips(count: int) -> bytes:
+    """Equal clips of a node with a morphing mesh, which is baked."""
+    document = json.loads(many.clips_equal(count)[20:].rstrip(b"\0 "))
+    targets = {**many.MESH["primitives"][0], "targets": [{"POSITION": 2}]}
+    return text({**document, "meshes": [{"primitives": [targets], "weights": [0.5]}]})
+
+
+def test_accessors_that_clips_share_are_described_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond them each clip has its own JSON only."""
+    (tmp_path / "in.gltf").write_bytes(equal_clips(CLIPS))
+    counted = count_calls(monkeypatch, storage_cost, "_text")
+    report = call("inspect", tmp_path / "in.gltf", "--format", "json").json["files"][0]
+    assert len(counted) < CLIPS + 10
+    costs = [each["json_bytes"] for each in report["clips"]]
+    shared = report["clips"][0]["json_bytes"] * CLIPS - report["animation_json_bytes"]
+    assert costs[0] < costs[-1] == costs[0] + len("c299") - len("c0")
+    assert shared > 0
