@@ -108,12 +108,14 @@ def nearest_ancestor(parents: Sequence[int] | Ints, node: int, among: Container[
     return next((above for above in ancestors(parents, node) if above in among), -1)
 
 
-def nearest_ancestors(skeleton: Skeleton, among: Container[int]) -> list[int]:
-    """Return for every node the nearest one above it that is in `among`, −1 for none; in one pass for all."""
-    found = [-1] * len(skeleton)
-    for level in skeleton.levels()[1:]:
-        for node, parent in zip(level.tolist(), skeleton.parents[level].tolist(), strict=True):
-            found[node] = parent if parent in among else found[parent]
+def nearest_ancestors(parents: Ints, chosen: Bools) -> Ints:
+    """Return for every node (N,) the nearest one above it among those of a mask (N,), −1 for none.
+
+    parents: (N,), −1 for roots. Each step looks twice as far up, so that a chain of N nodes takes log2(N) steps.
+    """
+    found = parents.copy()
+    while len(some := np.flatnonzero((found >= 0) & ~chosen[found])):
+        found[some] = found[found[some]]
     return found
 
 

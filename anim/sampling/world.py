@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from anim.arrays import Floats
-from anim.maths import matrix, quaternion
+from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Pose, Skeleton
 
 
@@ -26,28 +26,37 @@ def accumulate(skeleton: Skeleton, local: Floats) -> Floats:
     return matrix.accumulate_world(local, skeleton.parents, skeleton.levels(), in_place=True)
 
 
-def world_rotations(skeleton: Skeleton, local: Floats) -> dict[int, Floats]:
-    """Return the world rotation (F, 4) of every node from local ones (F, N, 4).
+def world_rotations(skeleton: Skeleton, local: Floats) -> Floats:
+    """Return the world rotations (N, F, 4) of all nodes from local ones (F, N, 4).
 
     Scales count by the signs of the rest pose only. Below an odd count of negative scales the result is the rotation
     in −1 times the orthogonal world matrix: the −1 cancels between two poses.
     """
-    world: dict[int, Floats] = {}
-    for level in skeleton.levels():
-        for node in level.tolist():
-            parent = int(skeleton.parents[node])
-            own = local[:, node]
-            world[node] = own if parent < 0 else quaternion.multiply(with_scale_signs(skeleton, parent, world), own)
-    return world
+    own = np.swapaxes(local, 0, 1).copy()
+    below = np.flatnonzero(skeleton.parents >= 0)
+    signs = _scale_signs(skeleton.scale[skeleton.parents[below]])
+    some = (signs < 0).any(axis=-1)
+    own[below[some]] = quaternion.multiply(_half_turns(signs[some])[:, None], own[below[some]])
+    return hierarchy.accumulate(own, skeleton.parents, skeleton.levels(), quaternion.multiply, out=own)
 
 
 def with_scale_signs(skeleton: Skeleton, node: int, world: Mapping[int, Floats]) -> Floats:
     """Return a node's world rotation (..., 4) times the signs of its scale: the space of its children."""
-    signs = np.where(skeleton.scale[node] < 0, -1.0, 1.0)
-    signs = signs * signs.prod()  # none or two are negative: a rotation by 180° about the third axis
+    signs = _scale_signs(skeleton.scale[node])
     if (signs > 0).all():
         return world[node]
-    return quaternion.multiply(world[node], np.append(signs > 0, 0.0))
+    return quaternion.multiply(world[node], _half_turns(signs))
+
+
+def _scale_signs(scale: Floats) -> Floats:
+    """The signs (..., 3) of scales (..., 3) times their product: none or two are negative, as of a rotation."""
+    signs = np.where(scale < 0, -1.0, 1.0)
+    return np.asarray(signs * signs.prod(axis=-1, keepdims=True))
+
+
+def _half_turns(signs: Floats) -> Floats:
+    """The rotations (..., 4) by 180° about the axis that is not negated, of signs (..., 3) with two negative ones."""
+    return np.concatenate((signs > 0, np.zeros((*signs.shape[:-1], 1))), axis=-1)
 
 
 def local_by_node(skeleton: Skeleton, pose: Pose) -> Floats:

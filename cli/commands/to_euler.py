@@ -103,7 +103,7 @@ def command(
             meters = f"{scale or DEFAULT_METERS_PER_UNIT:g}"
             words = f"1 unit = {meters} m (from-euler --scale {meters}), "
     if not dry_run:
-        documents.write_text(data.decode(), output)
+        documents.write_text(data, output)
     if num_bound:
         verb = "rests" if num_bound == 1 else "rest"
         resting = f"{plural(num_bound, 'joint')} {verb} elsewhere in the file than the skin was bound"

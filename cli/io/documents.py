@@ -133,26 +133,27 @@ def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
         atomic.write_file(Path(path), list(pieces))
 
 
-def write_text(text: str, path: str = PIPE) -> None:
+def write_text(text: str | bytes, path: str = PIPE) -> None:
     """Write text to a file atomically, or to stdout: UTF-8 in any locale.
 
-    A lone surrogate, which JSON strings can contain and UTF-8 can't, is written as its JSON escape: \\ud83d.
+    text: bytes if it is encoded already. A lone surrogate, which JSON strings can contain and UTF-8 can't, is written
+    as its JSON escape: \\ud83d.
     """
     with commit_text_after(text, path):
         pass
 
 
 @contextmanager
-def commit_text_after(text: str, path: str) -> Iterator[None]:
+def commit_text_after(text: str | bytes, path: str) -> Iterator[None]:
     """Write text like `write_text`; a file is replaced after the block, or not at all if the block fails."""
+    data = text if isinstance(text, bytes) else text.encode(errors="backslashreplace")
     if path == PIPE:
-        stdout.write_text(text)
+        stdout.write([data])
         yield
     else:
         from anim.files import atomic
 
-        content = np.frombuffer(text.encode(errors="backslashreplace"), np.uint8)
-        with atomic.commit_after(Path(path), [content]):
+        with atomic.commit_after(Path(path), [np.frombuffer(data, np.uint8)]):
             yield
 
 

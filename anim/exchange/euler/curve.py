@@ -29,6 +29,7 @@ class Mode(IntEnum):
     CUBIC = 2
 
 
+CUBIC = int(Mode.CUBIC)
 MODES = {mode.name.lower(): mode for mode in Mode}
 
 
@@ -77,7 +78,7 @@ class Curve:
                 object.__setattr__(self, name, arrays.as_floats(given, shape, name=name))
                 if name in WEIGHTS and not ((given >= 0) & (given <= 1)).all():
                     raise RangeError(f"{name} go from {given.min():g} to {given.max():g} (expected shares, 0 … 1)")
-        if (self.in_tangents is None or self.out_tangents is None) and Mode.CUBIC in self.modes.tobytes():
+        if (self.in_tangents is None or self.out_tangents is None) and CUBIC in self.modes.tobytes():
             raise ShapeError("a cubic curve lacks tangents")
 
     @property

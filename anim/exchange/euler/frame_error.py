@@ -6,8 +6,10 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
-from anim.model import Clip, Interpolation, Track, ValueKind
-from anim.sampling.track import sample
+from anim.model import Clip, Interpolation, ValueKind
+from anim.sampling.batch import Batch, batches, lazy_batches
+
+BLOCK_VALUES = 1 << 16  # rotations compared at a time
 
 
 def frame_error(clip: Clip, times: Floats) -> tuple[float, float]:
@@ -19,31 +21,34 @@ def frame_error(clip: Clip, times: Floats) -> tuple[float, float]:
     most = 0.0, float(times[0])
     if len(times) < 2:
         return most
-    for track in clip.tracks:
-        if track.kind is not ValueKind.ROTATION:
-            continue
-        inside = track.times[(track.times > times[0]) & (track.times < times[-1])]
-        stepped = track.interpolation is Interpolation.STEP
+    rotations = [track for track in clip.tracks if track.kind is ValueKind.ROTATION]
+    for stack in lazy_batches(rotations):
+        keys = stack.time_axis.times
+        inside = keys[(keys > times[0]) & (keys < times[-1])]
+        stepped = stack.tracks[0].interpolation is Interpolation.STEP
         at = inside if stepped else np.union1d(inside, (times[1:] + times[:-1]) / 2)
         if not len(at):
             continue
-        angles = (_step_angles if stepped else _slerp_angles)(track, times, at)
-        worst = int(angles.argmax())
-        most = max(most, (float(angles[worst]), float(at[worst])))
+        size = max(BLOCK_VALUES // (len(at) + len(times)), 1)
+        for first in range(0, len(stack.tracks), size):
+            batch = batches(stack.tracks[first : first + size])[0]
+            angles = (_step_angles if stepped else _slerp_angles)(batch, times, at)
+            worst = angles.argmax(axis=0)
+            most = max(most, *zip(angles.max(axis=0).tolist(), at[worst].tolist(), strict=True))
     return most
 
 
-def _slerp_angles(track: Track, times: Floats, at: Floats) -> Floats:
-    """Return the angles (K,) between the track and the slerp of its frames."""
-    frame, frames = _frames_before(times, at), sample(track, times)
+def _slerp_angles(tracks: Batch, times: Floats, at: Floats) -> Floats:
+    """Return the angles (K, G) between the tracks and the slerp of their frames."""
+    frame, frames = _frames_before(times, at), tracks.sample(times)
     u = (at - times[frame]) / (times[frame + 1] - times[frame])
-    between = quaternion.slerp(frames[frame], frames[frame + 1], u)
-    return quaternion.angle_between(between, sample(track, at))
+    between = quaternion.slerp(frames[frame], frames[frame + 1], u[:, None])
+    return quaternion.angle_between(between, tracks.sample(at))
 
 
-def _step_angles(track: Track, times: Floats, at: Floats) -> Floats:
-    """Return the angles (K,) between the track and the nearer of the frames before and after."""
-    frame, frames, values = _frames_before(times, at), sample(track, times), sample(track, at)
+def _step_angles(tracks: Batch, times: Floats, at: Floats) -> Floats:
+    """Return the angles (K, G) between the tracks and the nearer of the frames before and after."""
+    frame, frames, values = _frames_before(times, at), tracks.sample(times), tracks.sample(at)
     before, after = (quaternion.angle_between(frames[k], values) for k in (frame, frame + 1))
     return np.minimum(before, after)
 

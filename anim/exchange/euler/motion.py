@@ -12,7 +12,7 @@ from anim.arrays import Floats
 from anim.exchange.euler.curve import Curve
 from anim.maths.euler import AxesConvention
 
-ZERO = np.zeros(3)
+ZERO, ONES = np.zeros(3), np.ones(3)
 IDENTITY = np.array((0.0, 0.0, 0.0, 1.0))
 
 
@@ -78,7 +78,7 @@ class EulerNode:
     angles: Floats
     rotation: tuple[Curve | None, ...]
     moves: Mapping[int, Curve] = field(default_factory=dict)
-    scale: Floats = field(default_factory=lambda: np.ones(3))
+    scale: Floats = field(default_factory=lambda: ONES)
     scales: Mapping[int, Curve] = field(default_factory=dict)
     pivots: Pivots = NO_PIVOTS
     end: bool = False

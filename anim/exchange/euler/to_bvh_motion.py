@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, freeze
+from anim.arrays import Bools, Floats, Ints, freeze
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, Mode, uniform_modes
 from anim.exchange.euler.frame_error import frame_error
@@ -18,9 +17,10 @@ from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD
 from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
+from anim.maths.hierarchy import with_ancestors, with_descendants
 from anim.model import Clip, Skeleton, TimeAxis
-from anim.model.skeleton import ancestors, nearest_ancestors
-from anim.sampling import rest_pose, sample_pose, world_matrices
+from anim.model.skeleton import nearest_ancestors
+from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
 from anim.sampling.world import world_rotations
 from anim.units import format_number
 
@@ -77,16 +77,18 @@ class _Skeleton:
 
     def __init__(self, skeleton: Skeleton, clip: Clip, chosen: Sequence[int], times: Floats) -> None:
         moving, still = sample_pose(skeleton, clip, times), rest_pose(skeleton)
-        numbers = {node: i for i, node in enumerate(chosen)}
-        above = nearest_ancestors(skeleton, numbers)
-        ends = _ends(skeleton, clip, numbers)
-        self.parents = np.array([numbers.get(above[node], -1) for node in chosen])
-        self.is_end = np.array([node in ends for node in chosen])
-        self._home = _with_world(world_matrices(skeleton, still)[..., 3][0, chosen], ZERO)
+        is_chosen, is_end = np.zeros((2, len(skeleton)), np.bool_)
+        is_chosen[chosen] = True
+        is_end[_ends(skeleton, clip, is_chosen)] = True
+        numbers = np.full(len(skeleton) + 1, -1)
+        numbers[chosen] = np.arange(len(chosen))
+        self.parents = numbers[nearest_ancestors(skeleton.parents, is_chosen)[chosen]]
+        self.is_end = is_end[chosen]
+        self._home = _with_world(rest_world(skeleton)[chosen, :, 3], ZERO)
         self._places = _with_world(world_matrices(skeleton, moving)[..., 3][:, chosen], ZERO)
-        turned, unturned = (world_rotations(skeleton, pose.rotation) for pose in (moving, still))
-        back = quaternion.conjugate(np.stack([unturned[n] for n in chosen], axis=1))
-        self._turns = _with_world(quaternion.multiply(np.stack([turned[n] for n in chosen], axis=1), back), IDENTITY)
+        turned, unturned = (world_rotations(skeleton, pose.rotation)[chosen] for pose in (moving, still))
+        turns = quaternion.multiply(turned, quaternion.conjugate(unturned))
+        self._turns = _with_world(turns.swapaxes(0, 1), IDENTITY)
         self.size = float(np.ptp(self._home[:-1], axis=0).max()) or 1.0
 
     def relative(self, some: slice) -> tuple[Floats, Floats, Floats]:
@@ -107,28 +109,29 @@ def _with_world(values: Floats, own: Floats) -> Floats:
 def _nodes(
     figure: _Skeleton, names: Sequence[str], orders: OrderRules, shown: Floats, meters_per_unit: float
 ) -> list[EulerNode]:
-    """Joints with their required curves; lengths in the file's unit, keys at times `shown`."""
+    """Joints with their required curves, none for angles that stay 0; lengths in the file's unit, keys at `shown`."""
     axis, size = TimeAxis(shown), max(1, BLOCK_VALUES // len(shown))
     modes = uniform_modes(len(shown), Mode.LINEAR)
     made = []
     for first in range(0, len(names), size):
         some = slice(first, first + size)
         offset, turn, path = figure.relative(some)
-        parents = figure.parents[some]
+        offsets, parents = offset / meters_per_unit, figure.parents[some]
         moved = (parents < 0) | (np.abs(path - offset).max(axis=(0, 2)) > CONSTANT_TOLERANCE * figure.size)
         end = (parents >= 0) & ~moved & figure.is_end[some]
         chosen = [orders.of(name, turn[:, i]) for i, name in enumerate(names[some])]
         angles, paths = _by_curve(_angles(turn, chosen)), _by_curve(path / meters_per_unit)
+        still = end | ~angles.any(axis=(1, 2))
         for i, name in enumerate(names[some]):
             made.append(
                 EulerNode(
                     name,
                     int(parents[i]),
-                    offset[i] / meters_per_unit,
+                    offsets[i],
                     chosen[i],
                     AxesConvention.INTRINSIC,
-                    np.zeros(3),
-                    (None, None, None) if end[i] else tuple(_curves(axis, angles[i], modes)),
+                    ZERO,
+                    (None, None, None) if still[i] else tuple(_curves(axis, angles[i], modes)),
                     dict(enumerate(_curves(axis, paths[i], modes))) if moved[i] else {},
                     end=bool(end[i]),
                 )
@@ -166,24 +169,27 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
 
 def _choose_frames(skeleton: Skeleton, clip: Clip, joints: Collection[int]) -> list[int]:
     """Nodes to write, parents first: the joints, the nodes between them, and leaves as end markers."""
-    wanted = set(joints) or set(range(len(skeleton)))
-    above = nearest_ancestors(skeleton, set(wanted))
-    for node in list(wanted):
-        if above[node] >= 0:
-            wanted.update(takewhile(lambda parent: parent not in wanted, ancestors(skeleton.parents, node)))
-    wanted |= _ends(skeleton, clip, wanted)
-    return [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
+    wanted = np.zeros(len(skeleton), np.bool_)
+    wanted[list(joints) or slice(None)] = True
+    wanted = with_ancestors(skeleton.parents, wanted) & with_descendants(skeleton.parents, wanted)
+    wanted[_ends(skeleton, clip, wanted)] = True
+    order: Ints = np.concatenate([np.zeros(0, np.int64), *skeleton.levels()])
+    chosen: list[int] = order[wanted[order]].tolist()
+    return chosen
 
 
-def _ends(skeleton: Skeleton, clip: Clip, among: Collection[int]) -> set[int]:
-    """Static leaves named as ends of a node in `among`."""
+def _ends(skeleton: Skeleton, clip: Clip, among: Bools) -> list[int]:
+    """Static leaves named as ends of a node in `among` (N,)."""
     parents = skeleton.parents.tolist()
     others = {*parents, *(track.node for track in clip.tracks)}  # no leaf, or moving
-    return {
+    return [
         node
         for node, name in enumerate(skeleton.names)
-        if name.casefold().endswith(END_NAME_SUFFIX) and node not in others and parents[node] in among
-    }
+        if node not in others
+        and name.casefold().endswith(END_NAME_SUFFIX)
+        and parents[node] >= 0
+        and among[parents[node]]
+    ]
 
 
 def _names(skeleton: Skeleton) -> list[str]:
@@ -211,15 +217,16 @@ def _lost_between_frames(clip: Clip, times: Floats) -> tuple[str, ...]:
 
 def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:
     """Descriptions of the tracks that a BVH of the chosen nodes cannot represent."""
-    carrying = set(chosen)
-    for node in chosen:
-        carrying.update(takewhile(lambda above: above not in carrying, ancestors(skeleton.parents, node)))
-    names = labels(skeleton)
-    return [
-        label_of(track, names)
+    carrying = np.zeros(len(skeleton), np.bool_)
+    carrying[list(chosen)] = True
+    carrying = with_ancestors(skeleton.parents, carrying)
+    lost = [
+        track
         for track in clip.tracks
-        if track.path not in ("translation", "rotation") or track.node not in carrying
+        if track.path not in ("translation", "rotation") or track.node is None or not carrying[track.node]
     ]
+    names = labels(skeleton) if lost else []
+    return [label_of(track, names) for track in lost]
 
 
 def _by_curve(values: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -72,10 +72,14 @@ def to_euler(
     turns = {number: tracks["rotation"] for number, tracks in by_node.items() if "rotation" in tracks}
     rotations, deviation = _rotations(turns, chosen, asked)
     resting = _rest_angles(skeleton, chosen, frame)
-    nodes = [
+    parents = skeleton.parents.tolist()
+    static = set(without) - set(by_node) - set(parents)
+    kept = [number for number in range(len(names)) if number not in static]
+    places = {-1: -1, **{number: place for place, number in enumerate(kept)}}
+    nodes = tuple(
         EulerNode(
-            name,
-            int(skeleton.parents[number]),
+            names[number],
+            places[parents[number]],
             skeleton.translation[number],
             chosen[number],
             frame,
@@ -85,11 +89,9 @@ def to_euler(
             skeleton.scale[number],
             _axes(by_node.get(number, {}).get("scale"), frames),
         )
-        for number, name in enumerate(names)
-    ]
-    parents = set(skeleton.parents.tolist())
-    kept = [n for n in range(len(nodes)) if n not in without or n in by_node or n in parents]
-    return EulerCurves(EulerMotion(_renumber_nodes(nodes, kept), notes=skipped_note(lost)), deviation)
+        for number in kept
+    )
+    return EulerCurves(EulerMotion(nodes, notes=skipped_note(lost)), deviation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +172,6 @@ def _rotations_on_one_axis(
     if stepped or len(times) == 1:
         return curves, 0.0
     return curves, float(_interval_errors(batch.sample, times, angles, order, asked.frame).max())
-
-
-def _renumber_nodes(nodes: list[EulerNode], kept: list[int]) -> tuple[EulerNode, ...]:
-    places = {-1: -1, **{node: place for place, node in enumerate(kept)}}
-    return tuple(replace(nodes[node], parent=places[nodes[node].parent]) for node in kept)
 
 
 def _observed_angles(track: Track) -> Floats:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Iterator
+from functools import cache
+
 import numpy as np
 
 from anim.arrays import Floats
@@ -12,7 +16,34 @@ from anim.maths.euler import AxesConvention
 from anim.model import TimeAxis
 
 MAX_INDENT = 64  # tabs: with one per joint the size of a long chain is quadratic
+INDENTS = ["\t" * depth for depth in range(MAX_INDENT + 1)]
 DECIMALS = 6  # decimals of degrees and of the file's unit of length
+
+
+class _Columns:
+    """Channels in order: curves, constants (M,) for those without one, and which are angles."""
+
+    def __init__(self) -> None:
+        self.curves: list[Curve | None] = []
+        self.constants: list[float] = []
+        self.is_angle: list[bool] = []
+
+    def add(self, node: EulerNode) -> None:
+        if _has_position(node):
+            self.curves += map(node.moves.get, range(3))
+            self.constants += node.translation.tolist()
+            self.is_angle += [False] * 3
+        self.curves += node.rotation
+        self.constants += node.angles.tolist()
+        self.is_angle += [True] * len(node.rotation)
+
+    def rows(self, axis: TimeAxis) -> Floats:
+        """Values (F, M) at the frames: metres of the file's unit, and degrees."""
+        rows = np.tile(self.constants, (len(axis), 1))
+        for i, curve in enumerate(self.curves):
+            if curve is not None:  # on the axis of all, as is usual
+                rows[:, i] = curve.values if curve.time_axis is axis else evaluate(curve, axis.times)
+        return np.where(self.is_angle, np.degrees(rows), rows)
 
 
 def write(motion: EulerMotion) -> bytes:
@@ -26,30 +57,36 @@ def write(motion: EulerMotion) -> bytes:
             raise UnsupportedError("a BVH has intrinsic angles and no pivots", where=f"node '{node.name}'")
     axis = _frame_times(motion)
     times = axis.times
-    lines = ["HIERARCHY"]
+    columns, text = _Columns(), io.BytesIO()  # encoded line by line: of the whole there is one copy
+
+    def put(lines: str) -> None:
+        text.write(f"{lines}\n".encode(errors="backslashreplace"))  # a lone surrogate, valid in JSON names
+
+    put("HIERARCHY")
     children: dict[int, list[int]] = {}
     for number, node in enumerate(motion.nodes):
         children.setdefault(node.parent, []).append(number)
-    columns: list[Floats] = []
-    waiting: list[tuple[int, int] | str] = [(root, 0) for root in reversed(children.get(-1, []))]
+    offsets = list(_format_vectors(np.array([node.translation for node in motion.nodes])))
+    waiting: list[tuple[int, int]] = [(root, 0) for root in reversed(children.get(-1, []))]
     while waiting:  # iterative: a rope may have more joints in sequence than Python's recursion limit
-        item = waiting.pop()
-        if isinstance(item, str):
-            lines.append(item)
+        number, depth = waiting.pop()
+        tabs = INDENTS[min(depth, MAX_INDENT)]
+        if number < 0:
+            put(f"{tabs}}}")
             continue
-        number, depth = item
         node, below = motion.nodes[number], children.get(number, [])
-        lines += _open_joint(node, depth, is_leaf=not below)
+        put(_open_joint(node, offsets[number], tabs, is_leaf=not below))
         if not node.end:
-            columns += _columns(node, axis, _has_position(node))
-            waiting.append("\t" * min(depth, MAX_INDENT) + "}")
+            columns.add(node)
+            waiting.append((-1, depth))  # its end
             waiting += [(child, depth + 1) for child in reversed(below)]
     step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1 / 30
-    lines += ["MOTION", f"Frames: {len(times)}", f"Frame Time: {step:.9f}".rstrip("0")]
-    rows = np.round(np.stack(columns, axis=-1), DECIMALS) + 0.0
+    put(f"MOTION\nFrames: {len(times)}\n" + f"Frame Time: {step:.9f}".rstrip("0"))
+    rows = np.round(columns.rows(axis), DECIMALS) + 0.0
     pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1])
-    lines += [pattern % tuple(row) for row in rows.tolist()]
-    return ("\n".join(lines) + "\n").encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
+    for row in rows:
+        put(pattern % tuple(row.tolist()))
+    return text.getvalue()
 
 
 def _frame_times(motion: EulerMotion) -> TimeAxis:
@@ -63,40 +100,28 @@ def _frame_times(motion: EulerMotion) -> TimeAxis:
     return axis
 
 
-def _open_joint(node: EulerNode, depth: int, *, is_leaf: bool) -> list[str]:
+def _open_joint(node: EulerNode, offset: str, tab: str, *, is_leaf: bool) -> str:
     """The lines of a node before its children; complete for an End Site and for a joint without children."""
-    tab = "\t" * min(depth, MAX_INDENT)
-    offset = f"OFFSET {_format_vector(node.translation)}"
     if node.end:
-        return [f"{tab}End Site", f"{tab}{{", f"{tab}\t{offset}", f"{tab}}}"]
-    positions = [f"{axis}position" for axis in "XYZ"] if _has_position(node) else []
-    names = positions + [f"{axis}rotation" for axis in node.order]
-    lines = [f"{tab}{'JOINT' if depth else 'ROOT'} {node.name}", f"{tab}{{", f"{tab}\t{offset}"]
-    lines.append(f"{tab}\tCHANNELS {len(names)} {' '.join(names)}")
-    end = [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\tOFFSET 0 0 0", f"{tab}\t}}"]
-    return lines + end if is_leaf else lines
+        return f"{tab}End Site\n{tab}{{\n{tab}\tOFFSET {offset}\n{tab}}}"
+    channels = _channels(node.order, _has_position(node))
+    kind = "JOINT" if node.parent >= 0 else "ROOT"
+    lines = f"{tab}{kind} {node.name}\n{tab}{{\n{tab}\tOFFSET {offset}\n{tab}\t{channels}"
+    return lines + f"\n{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET 0 0 0\n{tab}\t}}" if is_leaf else lines
+
+
+@cache
+def _channels(order: str, has_position: bool) -> str:
+    names = [f"{axis}position" for axis in "XYZ"] if has_position else []
+    names += [f"{axis}rotation" for axis in order]
+    return f"CHANNELS {len(names)} {' '.join(names)}"
 
 
 def _has_position(node: EulerNode) -> bool:
     return bool(node.moves) or node.parent < 0
 
 
-def _columns(node: EulerNode, axis: TimeAxis, with_position: bool) -> list[Floats]:
-    columns = []
-    for i in range(3) if with_position else ():
-        columns.append(_at_frames(node.moves.get(i), node.translation[i], axis))
-    for angle, turn in zip(node.angles.tolist(), node.rotation, strict=True):
-        columns.append(np.degrees(_at_frames(turn, angle, axis)))
-    return columns
-
-
-def _at_frames(curve: Curve | None, constant: float, axis: TimeAxis) -> Floats:
-    """Values (F,) of a curve at the frames; its own ones on the axis of all, as is usual."""
-    if curve is None:
-        return np.full(len(axis.times), constant)
-    return curve.values if curve.time_axis is axis else evaluate(curve, axis.times)
-
-
-def _format_vector(vector: Floats) -> str:
-    rounded = (np.round(vector, DECIMALS) + 0.0).tolist()
-    return " ".join(str(int(x)) if x == int(x) else f"{x:.{DECIMALS}f}" for x in rounded)
+def _format_vectors(vectors: Floats) -> Iterator[str]:
+    """Yield the text of each vector (N, 3)."""
+    for vector in (np.round(vectors, DECIMALS) + 0.0).tolist():
+        yield " ".join([str(int(x)) if x == int(x) else f"{x:.{DECIMALS}f}" for x in vector])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,14 @@ KEY_COLUMNS = ("node", "channel", "time", "value")
 EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
 DECIMALS = 9  # decimals
 
-Column = tuple[str, str, Curve]  # node, channel, its curve in the unit to write
+
+class _Column(NamedTuple):
+    """A curve of a node: its channel, and the factor from its unit to the one that is written."""
+
+    node: str
+    channel: str
+    curve: Curve
+    factor: float = 1.0
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
@@ -33,42 +41,46 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     out = io.StringIO()
     out.write(f"# order={convention.order} frame={convention.frame} unit={convention.unit}\n")
     rows = csv.writer(out, lineterminator="\n")
-    for node in motion.nodes:
+    radians = convention.unit.radians
+    rest = np.array([(node.translation, node.angles / radians, node.scale) for node in motion.nodes])
+    for node, values in zip(motion.nodes, rest.reshape(len(rest), -1), strict=True):
         parent = motion.nodes[node.parent].name if node.parent >= 0 else ""
-        rest = np.concatenate((node.translation, node.angles / convention.unit.radians, node.scale))
-        rows.writerow(["#node", node.name, parent, *map(_text, rest.tolist())])
-    columns = [column for node in motion.nodes for column in _columns(node, convention)]
-    straight = all((curve.modes == Mode.LINEAR).all() for _, _, curve in columns)
+        rows.writerow(["#node", node.name, parent, *map(_text, values.tolist())])
+    columns = [column for node in motion.nodes for column in _columns(node, 1 / radians)]
+    straight = not columns or bool((np.concatenate([column.curve.modes for column in columns]) == Mode.LINEAR).all())
     (_write_frames if straight else _write_keys)(rows, columns)
     return out.getvalue().encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
 
 
-def _columns(node: EulerNode, convention: Convention) -> list[Column]:
-    columns = [(node.name, f"t{'xyz'[axis]}", curve) for axis, curve in sorted(node.moves.items())]
+def _columns(node: EulerNode, per_radian: float) -> Iterator[_Column]:
+    for axis, curve in sorted(node.moves.items()):
+        yield _Column(node.name, f"t{'xyz'[axis]}", curve)
     for axis_name, turn in zip(axis_names(node.order), node.rotation, strict=True):
         if turn is not None:
-            columns.append((node.name, f"r{axis_name}", turn.scaled(1 / convention.unit.radians)))
-    return columns + [(node.name, f"s{'xyz'[axis]}", curve) for axis, curve in sorted(node.scales.items())]
+            yield _Column(node.name, f"r{axis_name}", turn, per_radian)
+    for axis, curve in sorted(node.scales.items()):
+        yield _Column(node.name, f"s{'xyz'[axis]}", curve)
 
 
-def _write_frames(rows: Any, columns: list[Column]) -> None:
-    rows.writerow(["time", *(f"{node}.{channel}" for node, channel, _ in columns)])
-    axes = dict.fromkeys(curve.time_axis for _, _, curve in columns)
+def _write_frames(rows: Any, columns: list[_Column]) -> None:
+    rows.writerow(["time", *(f"{column.node}.{column.channel}" for column in columns)])
+    axes = dict.fromkeys(column.curve.time_axis for column in columns)
     times = merge_times(axes)
     cells = [[_text(time)] + [""] * len(columns) for time in times.tolist()]
     places = {axis: np.searchsorted(times, axis.times).tolist() for axis in axes}
-    for number, (_, _, curve) in enumerate(columns, 1):
-        for place, value in zip(places[curve.time_axis], curve.values.tolist(), strict=True):
+    for number, (_, _, curve, factor) in enumerate(columns, 1):
+        for place, value in zip(places[curve.time_axis], (curve.values * factor).tolist(), strict=True):
             cells[place][number] = _text(value)
     rows.writerows(cells)
 
 
-def _write_keys(rows: Any, columns: list[Column]) -> None:
+def _write_keys(rows: Any, columns: list[_Column]) -> None:
     words = [mode.name.lower() for mode in Mode]
-    would_be_comments = any(node.startswith("#") for node, _, _ in columns)
+    would_be_comments = any(column.node.startswith("#") for column in columns)
     first, second = (1, 0) if would_be_comments else (0, 1)
     rows.writerow([KEY_COLUMNS[first], KEY_COLUMNS[second], *KEY_COLUMNS[2:], *EXTRA_COLUMNS])
-    for *named, curve in columns:
+    for *named, given, factor in columns:
+        curve = given.scaled(factor)
         handles = [getattr(curve, name) for name in HANDLES]
         extra = [[""] * len(curve.times) if h is None else [*map(_text, h.tolist())] for h in handles]
         keys = zip(curve.times.tolist(), curve.values.tolist(), curve.modes.tolist(), *extra, strict=True)

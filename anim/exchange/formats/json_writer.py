@@ -2,75 +2,108 @@
 
 from __future__ import annotations
 
-import re
-from typing import Any
+import json
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
 from anim.arrays import Floats
+from anim.errors import FormatError
 from anim.exchange.euler.convention import axis_names
 from anim.exchange.euler.curve import HANDLES, Curve, Mode
-from anim.exchange.euler.motion import NO_PIVOTS, OFFSETS, Convention, EulerMotion, EulerNode, Pivots
-from anim.gltf.io import json_text
+from anim.exchange.euler.motion import NO_PIVOTS, OFFSETS, Convention, EulerMotion, EulerNode
+from anim.model import TimeAxis
 
 SCHEMA = "euler-curves/1"
 PIVOT_ROTATIONS = ("pre_rotation", "post_rotation")
-MULTILINE_LIST = re.compile(rb"\[\n\s*([^][{}]*?)\s*\]")  # of numbers or strings
+DECIMALS = 10  # far below float32, without the noise of binary fractions
+
+Item = tuple[str, str]  # a key, and the text of its value
 
 
 def write(motion: EulerMotion, convention: Convention) -> bytes:
-    """Return the motion as a JSON of curves, in the unit and the default order of the convention."""
-    nodes = [_node_json(node, motion, convention) for node in motion.nodes]
-    content = {
-        "schema": SCHEMA,
-        "order": convention.order,
-        "frame": str(convention.frame),
-        "unit": str(convention.unit),
-        "nodes": nodes,
-    }
-    return MULTILINE_LIST.sub(_on_one_line, json_text.dump(content, indent=1)) + b"\n"
+    """Return the motion as a JSON of curves, in the unit and the default order of the convention.
+
+    Lists of numbers are on one line. Raises FormatError for a number that JSON cannot represent.
+    """
+    try:
+        return _Text(motion, convention, ensure_ascii=False).whole().encode()
+    except UnicodeEncodeError:  # a lone surrogate, which can be written only as an escape
+        return _Text(motion, convention, ensure_ascii=True).whole().encode()
 
 
-def _on_one_line(found: re.Match[bytes]) -> bytes:
-    return b"[" + b" ".join(found[1].split()) + b"]"
+class _Text:
+    """The text of a motion: Python's own encoder takes five times as long for lines with indent."""
+
+    def __init__(self, motion: EulerMotion, convention: Convention, *, ensure_ascii: bool) -> None:
+        self._motion, self._convention = motion, convention
+        self._quote: Callable[[str], str] = json.JSONEncoder(ensure_ascii=ensure_ascii).encode
+        self._times: dict[TimeAxis, str] = {}
+
+    def whole(self) -> str:
+        convention = self._convention
+        texts = (SCHEMA, convention.order, str(convention.frame), str(convention.unit))
+        items = zip(("schema", "order", "frame", "unit"), map(self._quote, texts), strict=True)
+        nodes = ",".join(f"\n  {node}" for node in self._nodes())
+        return _object((*items, ("nodes", f"[{nodes}\n ]" if nodes else "[]")), 0) + "\n"
+
+    def _nodes(self) -> Iterator[str]:
+        nodes = self._motion.nodes
+        angles = [node.angles / self._convention.unit.radians for node in nodes]
+        rest = ([node.translation for node in nodes], angles, [node.scale for node in nodes])
+        for node, *vectors in zip(nodes, *(_rounded(np.array(each)) for each in rest), strict=True):
+            yield _object(self._node(node, map(_numbers, vectors)), 2)
+
+    def _node(self, node: EulerNode, rest: Iterable[str]) -> Iterator[Item]:
+        yield "name", self._quote(node.name)
+        if node.order != self._convention.order:
+            yield "order", self._quote(node.order)
+        if node.parent >= 0:
+            yield "parent", self._quote(self._motion.nodes[node.parent].name)
+        yield from zip(("translation", "rotation", "scale"), rest, strict=True)
+        if node.pivots is not NO_PIVOTS:
+            for name in (*PIVOT_ROTATIONS, *OFFSETS):
+                yield name, _numbers(_rounded(getattr(node.pivots, name)))
+        if curves := [(name, _object(self._curve(curve), 4)) for name, curve in self._curves(node)]:
+            yield "curves", _object(curves, 3)
+
+    def _curves(self, node: EulerNode) -> Iterator[tuple[str, Curve]]:
+        for axis, curve in sorted(node.moves.items()):
+            yield f"translation.{'xyz'[axis]}", curve
+        for axis_name, turn in zip(axis_names(node.order), node.rotation, strict=True):
+            if turn is not None:
+                yield f"rotation.{axis_name}", turn.scaled(1 / self._convention.unit.radians)
+        for axis, curve in sorted(node.scales.items()):
+            yield f"scale.{'xyz'[axis]}", curve
+
+    def _curve(self, curve: Curve) -> Iterator[Item]:
+        axis = curve.time_axis
+        if axis not in self._times:
+            self._times[axis] = _numbers(_rounded(axis.times))
+        yield "times", self._times[axis]
+        yield "values", _numbers(_rounded(curve.values))
+        if (curve.modes != Mode.LINEAR).any():
+            words = [self._quote(Mode(mode).name.lower()) for mode in curve.modes.tolist()]
+            yield "interpolation", words[0] if len(set(words)) == 1 else f"[{', '.join(words)}]"
+        for name in HANDLES:
+            handle = getattr(curve, name)
+            if handle is not None:
+                yield name, _numbers(_rounded(handle))
 
 
-def _node_json(node: EulerNode, motion: EulerMotion, convention: Convention) -> dict[str, Any]:
-    about: dict[str, Any] = {"name": node.name}
-    if node.order != convention.order:
-        about["order"] = node.order
-    if node.parent >= 0:
-        about["parent"] = motion.nodes[node.parent].name
-    about["translation"] = _short(node.translation)
-    about["rotation"] = _short(node.angles / convention.unit.radians)
-    about["scale"] = _short(node.scale)
-    if node.pivots is not NO_PIVOTS:
-        about |= _pivots_json(node.pivots)
-    curves: dict[str, Any] = {}
-    for axis, curve in sorted(node.moves.items()):
-        curves[f"translation.{'xyz'[axis]}"] = _curve_json(curve)
-    for axis_name, turn in zip(axis_names(node.order), node.rotation, strict=True):
-        if turn is not None:
-            curves[f"rotation.{axis_name}"] = _curve_json(turn.scaled(1 / convention.unit.radians))
-    for axis, curve in sorted(node.scales.items()):
-        curves[f"scale.{'xyz'[axis]}"] = _curve_json(curve)
-    return {**about, "curves": curves} if curves else about
+def _object(items: Iterable[Item], depth: int) -> str:
+    """An object at a depth, with a line for each item and a space of indent per level."""
+    line = "\n" + " " * depth
+    return "{" + ",".join([f'{line} "{key}": {value}' for key, value in items]) + line + "}"
 
 
-def _pivots_json(pivots: Pivots) -> dict[str, Any]:
-    return {name: _short(getattr(pivots, name)) for name in (*PIVOT_ROTATIONS, *OFFSETS)}
-
-
-def _curve_json(curve: Curve) -> dict[str, Any]:
-    about: dict[str, Any] = {"times": _short(curve.times), "values": _short(curve.values)}
-    if (curve.modes != Mode.LINEAR).any():
-        words = [Mode(mode).name.lower() for mode in curve.modes.tolist()]
-        about["interpolation"] = words[0] if len(set(words)) == 1 else words
-    handles = {name: getattr(curve, name) for name in HANDLES}
-    return about | {name: _short(handle) for name, handle in handles.items() if handle is not None}
-
-
-def _short(values: Floats) -> list[float]:
-    """Numbers with ten decimals: far below float32, without the noise of binary fractions."""
-    rounded: list[float] = (np.round(values, 10) + 0.0).tolist()
+def _rounded(values: Floats) -> list[float]:
+    rounded: list[float] = (np.round(values, DECIMALS) + 0.0).tolist()
     return rounded
+
+
+def _numbers(values: Iterable[float]) -> str:
+    text = f"[{', '.join(map(repr, values))}]"
+    if "n" in text:  # inf or nan
+        raise FormatError("a number can't be written as JSON (out of range float values are not JSON compliant)")
+    return text

@@ -73,8 +73,8 @@ class PoseTransfer:
         world = self._world_matrices(local, source_world, motion, lowered)
         return TargetMotion(rotations, {b: local[b, :, :, 3] for b in self.pairs.values()}, scales, source_world, world)
 
-    def _rotations(self, source_rotations: dict[int, Floats]) -> dict[int, Floats]:
-        """Local rotations (F, 4): world rotations relative to rest as the source's, after rest correction."""
+    def _rotations(self, source_rotations: Floats) -> dict[int, Floats]:
+        """Local rotations (F, 4): world rotations relative to rest as the source's (N, F, 4), after rest correction."""
         rotation, target_world = self.aligned.rotation, dict[int, Floats]()
         for a, b in self.pairs.items():
             change = quaternion.multiply(source_rotations[a], quaternion.conjugate(self.source_rest.rotations[a]))
@@ -187,10 +187,9 @@ def build_transfer(
 
 def _rest_pose(skeleton: Skeleton, pose: Pose) -> RestPose:
     world = world_matrices(skeleton, pose)[0]
-    rotations = world_rotations(skeleton, pose.rotation)
     return RestPose(
         world[:, :, 3],
-        np.array([rotations[node][0] for node in range(len(skeleton))]),
+        world_rotations(skeleton, pose.rotation)[:, 0],
         tuple(skeleton.parents.tolist()),
         pose.scale[0],
         local_by_node(skeleton, pose)[:, 0, :, :3],

@@ -1,0 +1,36 @@
+"""Files of many nodes that move: rotations are computed for all of them at once, not node by node."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from anim.exchange.euler import curve
+from anim.maths import quaternion
+from tests import many
+from tests.calls import count_calls
+from tests.cli.conftest import Call
+
+NODES = 300
+MAX_CALLS = 100  # of a function on quaternions, in one command
+
+
+@pytest.mark.parametrize("make", [many.side_moving, many.chain_open, many.chain_bare])
+@pytest.mark.parametrize("name", ["multiply", "slerp", "angle_between"])
+def test_a_bvh_of_many_nodes(
+    make: many.Make, name: str, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(make(NODES))
+    counted = count_calls(monkeypatch, quaternion, name)
+    call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh", "--fps", "3").product()
+    assert 0 < len(counted) < MAX_CALLS
+
+
+def test_joints_of_a_bvh_that_do_not_turn_have_no_curves(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.chain(NODES))
+    counted = count_calls(monkeypatch, curve.Curve, "__post_init__")
+    call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh").product()
+    assert 0 < len(counted) < 10
