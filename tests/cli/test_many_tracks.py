@@ -8,6 +8,8 @@ import pytest
 
 from anim.exchange.euler import curve
 from anim.maths import quaternion
+from anim.measure.continuous_bound import interval_rise
+from anim.measure.error.metric import ErrorMetric
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
@@ -34,3 +36,24 @@ def test_joints_of_a_bvh_that_do_not_turn_have_no_curves(
     counted = count_calls(monkeypatch, curve.Curve, "__post_init__")
     call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh").product()
     assert 0 < len(counted) < 10
+
+
+def test_equal_clips_are_not_sampled(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = count_calls(monkeypatch, ErrorMetric, "sample_errors")
+    (tmp_path / "in.glb").write_bytes(many.side_moving(5))
+    report = call("diff", tmp_path / "in.glb", tmp_path / "in.glb", "--format", "json").json
+    assert report["clips"][0]["max_error_m"] == 0
+    assert not counted
+    (tmp_path / "other.glb").write_bytes(many.chain_open(5))  # equal clips, on other nodes
+    assert call("diff", tmp_path / "in.glb", tmp_path / "other.glb", "--format", "json").json["max_error_m"] > 0
+    assert counted
+
+
+def test_tracks_are_sorted_once_for_all_steps_of_a_proof(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = count_calls(monkeypatch, interval_rise, "partition_tracks")
+    steps = count_calls(monkeypatch, interval_rise, "world_bounds")
+    (tmp_path / "in.glb").write_bytes(many.side_moving(2000))
+    call("resample", tmp_path / "in.glb", tmp_path / "out.glb", "--fps", "60").product()
+    assert len(counted) == 1 < len(steps)

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Ints
+from anim.arrays import Floats, Ints
 from anim.measure.compare import name_matching
 from anim.measure.compare.correspondence import Correspondence
+from anim.measure.compare.equal_scenes import are_equal
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.equal_clips import first_equal
 from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.measure.error.sample_times import FPS, dense_times
-from anim.measure.error.statistics import Statistics, statistics
+from anim.measure.error.statistics import Peak, Statistics, statistics
 from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair
 
@@ -163,31 +164,50 @@ def _compare_pairs(
 ) -> list[ClipDiff]:
     """The differences of clips by index. Pairs with equal tracks are measured once."""
     first = first_equal([(old[i], new[j]) for i, j in pairs])
+    alike = len(set(parse_pair(player))) == 1 and are_equal(prover.ruler.scene, prover.ruler.other, prover.ruler.pairs)
     found: list[ClipDiff] = []
     for n, (i, j) in enumerate(pairs):
         if first[n] < n:
             found.append(found[first[n]]._replace(old=i, new=j, name=old[i].name, new_name=new[j].name))
+            continue
+        before, after = old[i], new[j]
+        times = dense_times(before, after, fps=fps)
+        if alike and before.tracks == after.tracks:
+            measured = _Measured(MotionError(0.0, float(times[0]), "", "", len(times)), 0.0, STILL)
         else:
-            found.append(_compare_clips(prover, (i, old[i]), (j, new[j]), player=player, fps=fps))
+            measured = _measure(prover, before, after, times, player=player, fps=fps)
+        ends = before.end, after.end
+        found.append(ClipDiff(i, j, before.name, after.name, *measured, *ends, *_lost(prover.ruler, before, after)))
     return found
 
 
-def _compare_clips(
-    prover: Prover, old: tuple[int, Clip], new: tuple[int, Clip], *, player: str, fps: float
-) -> ClipDiff:
-    before, after, ruler = old[1], new[1], prover.ruler
-    times = dense_times(before, after, fps=fps)
+class _Measured(NamedTuple):
+    """Fields of a `ClipDiff` that take long."""
+
+    error: MotionError
+    certified: float | None
+    statistics: Statistics
+
+
+STILL = Statistics(0.0, 0.0, Peak(), Peak(), Peak())  # of equal clips
+
+
+def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player: str, fps: float) -> _Measured:
+    ruler = prover.ruler
     look = ruler.sample_errors(before, after, times, players=(player,))
     error, bound = look.error, None
     if len(set(parse_pair(player))) == 1:
         proof = prover.certified(before, after, times, look)
         error, bound = proof.error, proof.bound
     found = statistics(ruler, before, after, times=times, block=look.block, player=player, fps=fps)
+    return _Measured(error, bound, found)
+
+
+def _lost(ruler: ErrorMetric, before: Clip, after: Clip) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Targets of tracks of only the old clip, and of only the new one."""
     one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))
     missing = tuple(name for key, name in one.items() if key not in other)
-    added = tuple(name for key, name in other.items() if key not in one)
-    names = before.name, after.name
-    return ClipDiff(old[0], new[0], *names, error, bound, found, before.end, after.end, missing, added)
+    return missing, tuple(name for key, name in other.items() if key not in one)
 
 
 def _targets(ruler: ErrorMetric, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:

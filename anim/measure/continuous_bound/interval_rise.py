@@ -12,9 +12,16 @@ from anim.measure.continuous_bound.influence_radius import InfluenceRadius
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S, merge_intervals
 from anim.measure.continuous_bound.node_bounds import world_bounds
 from anim.measure.continuous_bound.second_derivative import second_derivative_bound
-from anim.measure.continuous_bound.track_partition import partition_tracks
+from anim.measure.continuous_bound.track_partition import ClipVersion, partition_tracks
 from anim.model import Clip, Scene
 from anim.sampling.weight_pointers import resolve_weight_pointers
+
+
+class ClipVersions(NamedTuple):
+    """Both versions of a clip: with weights of pointers as tracks, and sorted by what moves."""
+
+    clips: tuple[Clip, Clip]
+    sides: tuple[ClipVersion, ClipVersion]
 
 
 class IntervalRise(NamedTuple):
@@ -28,9 +35,14 @@ class IntervalRise(NamedTuple):
     jump: Floats
 
 
+def prepare_versions(scenes: tuple[Scene, Scene], clips: tuple[Clip, Clip]) -> ClipVersions:
+    """Return both versions of a clip, each on its scene, for any number of calls of `interval_rise`."""
+    one, other = (resolve_weight_pointers(s.skeleton, clip) for s, clip in zip(scenes, clips, strict=True))
+    return ClipVersions((one, other), partition_tracks(scenes, (one, other)))
+
+
 def interval_rise(
-    scenes: tuple[Scene, Scene],
-    clips: tuple[Clip, Clip],
+    versions: ClipVersions,
     times: Floats,
     reaches: Sequence[InfluenceRadius],
     players: Sequence[str],
@@ -44,9 +56,8 @@ def interval_rise(
     longest: s, intervals between keys up to this duration are bounded as one; shorter ones cost more and bound better.
     Source: |f(t)| ≤ max(|f(0)|, |f(h)|) + h²/8 · sup|f″|, since f minus its chord is bounded by the second term.
     """
-    resolved = tuple(resolve_weight_pointers(s.skeleton, clip) for s, clip in zip(scenes, clips, strict=True))
-    first, second = partition_tracks(scenes, (resolved[0], resolved[1]))
-    where = merge_intervals(times, *resolved, longest=longest)
+    first, second = versions.sides
+    where = merge_intervals(times, *versions.clips, longest=longest)
     with np.errstate(all="ignore"):  # without a bound: inf or nan
         nodes = world_bounds(first, second, where, players=players)
         each = [second_derivative_bound(reach, nodes, first, second, where) for reach in reaches]

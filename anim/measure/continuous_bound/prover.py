@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import influence_radius
-from anim.measure.continuous_bound.interval_rise import interval_rise
+from anim.measure.continuous_bound.interval_rise import IntervalRise, interval_rise, prepare_versions
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.refinement import OpenIntervals, RefinedMaximum, refine
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
@@ -94,11 +94,14 @@ class Prover:
         bound = max(worst.max_error, floor)
         room = max(bound * slack, NOISE * self.ruler.diagonal)
         aim = ProofTarget(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
-        seen = RefinedMaximum()
-        for start in range(0, len(times) - 1 if self._parts else 0, self._length(len(look.limits))):
-            stretch = slice(start, start + self._length(len(look.limits)) + 1)
+        seen, length = RefinedMaximum(), self._length(len(look.limits))
+        scenes = Scene(self.ruler.skeletons[0], ()), Scene(self.ruler.skeletons[1], ())
+        versions = prepare_versions(scenes, self.ruler.clips(before, after))
+        for start in range(0, len(times) - 1 if self._parts else 0, length):
+            stretch = slice(start, start + length + 1)
             limits = _limits(look.limits, self._order, stretch)
-            closed, other = self._proven((before, after), times[stretch], limits, aim, longest)
+            risen = interval_rise(versions, times[stretch], self._reaches, list(limits), longest=longest)
+            closed, other = self._proven((before, after), times[stretch], limits, risen, aim)
             bound = max(bound, closed)
             seen = max(seen, other, key=lambda each: each.largest)
         if seen.largest > worst.max_error:
@@ -117,13 +120,14 @@ class Prover:
         return max(block // (players * (groups + nodes) + 1), 8)
 
     def _proven(
-        self, clips: tuple[Clip, Clip], times: Floats, limits: Mapping[str, Floats], aim: ProofTarget, longest: float
+        self,
+        clips: tuple[Clip, Clip],
+        times: Floats,
+        limits: Mapping[str, Floats],
+        risen: IntervalRise,
+        aim: ProofTarget,
     ) -> tuple[float, RefinedMaximum]:
         """The bound of all intervals without refinement, and the result of refining the others."""
-        one, other = (Scene(each, ()) for each in self.ruler.skeletons)
-        risen = interval_rise(
-            (one, other), self.ruler.clips(*clips), times, self._reaches, list(limits), longest=longest
-        )
         closed, opened = 0.0, []
         for player, each in limits.items():
             ends = each[:, :-1], each[:, 1:] + risen.jump

@@ -9,7 +9,7 @@ import pytest
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
-from anim.measure.continuous_bound.interval_rise import IntervalRise, interval_rise
+from anim.measure.continuous_bound.interval_rise import IntervalRise, interval_rise, prepare_versions
 from anim.measure.continuous_bound.refinement import OpenIntervals, refine, subdivide
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
@@ -29,7 +29,7 @@ def _turning(degrees: float, end: float = 1.0) -> Clip:
 def _rises(of: Scene, before: Clip, after: Clip, times: Floats, player: str = "spec") -> IntervalRise:
     ruler = ErrorMetric(of)
     reaches = [each for each in map(influence_radius, ruler.parts) if each is not None]
-    return interval_rise((of, of), (before, after), times, reaches, [player])
+    return interval_rise(prepare_versions((of, of), (before, after)), times, reaches, [player])
 
 
 def test_a_turn_away_from_rest_rises_by_its_sagitta() -> None:
