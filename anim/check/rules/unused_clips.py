@@ -31,7 +31,7 @@ def _reachable(file: CheckedFile, roots: list[int]) -> set[int | None]:
         node = stack.pop()
         if node not in found:
             found.add(node)
-            stack = [*stack, *nodes[node].get("children", ())]
+            stack.extend(nodes[node].get("children", ()))
     return found
 
 

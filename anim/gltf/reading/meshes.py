@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +21,8 @@ POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = 
 class Meshes:
     """Reader of one document's meshes, each once per skin size.
 
+    Meshes and primitives of the same accessors share arrays, which are read-only.
+
     normals, tangents: read those too.
     """
 
@@ -31,6 +34,7 @@ class Meshes:
         self._accessors = accessors
         self._wanted = {"NORMAL": normals, "TANGENT": tangents}
         self._done: dict[tuple[int, int], Mesh] = {}
+        self._unnamed: dict[tuple[int, tuple[str, ...]], Mesh] = {}
 
     def mesh(self, number: int, *, joint_count: int) -> Mesh:
         """Return a mesh, its primitives concatenated. joint_count: of its skin, 0 without one.
@@ -48,31 +52,34 @@ class Meshes:
         return self._done[key]
 
     def _read(self, about: Json, joint_count: int) -> Mesh:
-        parts = []
-        for i, primitive in enumerate(about["primitives"]):
-            try:
-                parts.append(self._primitive(primitive, joint_count))
-            except AnimError as error:
-                raise error.at(f"primitive {i}") from None
-        offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
-        influences = max((part.joints.shape[1] for part in parts), default=0)
-        faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=False)]
-        count = len(about["primitives"][0].get("targets", ())) if about["primitives"] else 0
-        return Mesh(
-            about.get("name", ""),
-            np.concatenate([np.empty((0, 3)), *(part.positions for part in parts)]),
-            np.concatenate([np.empty((0, 3), np.int64), *faces]),
-            _stack([part.joints for part in parts], influences, np.int64),
-            _stack([part.weights for part in parts], influences, np.float64),
-            np.concatenate([np.empty((count, 0, 3)), *(part.targets for part in parts)], axis=1),
-            np.array(about.get("weights") or [0.0] * count, float),
-            _of_all([part.normals for part in parts]),
-            _targets_of_all([(part.normal_targets, part.targets) for part in parts]),
-            tuple(primitive for part in parts for primitive in part.primitives),
-            _of_all([part.tangents for part in parts]),
-            _targets_of_all([(part.tangent_targets, part.targets) for part in parts]),
-            _sums_of_all(parts),
+        primitives = about["primitives"]
+        stored = tuple(map(_stored, primitives))
+        if (joint_count, stored) not in self._unnamed:
+            self._unnamed[joint_count, stored] = self._joined(primitives, stored, joint_count)
+        mesh = self._unnamed[joint_count, stored]
+        ranges = zip(mesh.primitives, primitives, strict=True)
+        return replace(
+            mesh,
+            name=about.get("name", ""),
+            rest_weights=np.array(about.get("weights") or [0.0] * len(mesh.targets), float),
+            primitives=tuple(PrimitiveRange(each.vertices, each.faces, _material(of)) for each, of in ranges),
         )
+
+    def _joined(self, primitives: Sequence[Json], stored: Sequence[str], joint_count: int) -> Mesh:
+        """The primitives as one mesh without name and materials; equal ones are read once."""
+        read: dict[str, Mesh] = {}
+        parts = []
+        for i, (primitive, text) in enumerate(zip(primitives, stored, strict=True)):
+            if text not in read:
+                try:
+                    read[text] = self._primitive(primitive, joint_count)
+                except AnimError as error:
+                    raise error.at(f"primitive {i}") from None
+            parts.append(read[text])
+        if len(parts) == 1:
+            return parts[0]
+        self._accessors.budget.add(sum(map(_num_bytes, parts)))
+        return _join(parts, len(parts[0].targets) if parts else 0)
 
     def _primitive(self, primitive: Json, joint_count: int) -> Mesh:
         accessors, faces = self._accessors, None
@@ -90,8 +97,7 @@ class Meshes:
         about = primitive.get("targets", ())
         targets = self._displacements(about, "POSITION", len(positions))
         faces = self._faces(primitive, len(positions)) if faces is None else faces
-        material = primitive.get("material")
-        part = PrimitiveRange(len(positions), len(faces), material if type(material) is int else -1)
+        part = PrimitiveRange(len(positions), len(faces))
         return Mesh(
             "",
             positions,
@@ -123,7 +129,7 @@ class Meshes:
 
     def _displacements(self, targets: Sequence[Json], attribute: str, vertices: int) -> Floats:
         """Morph displacements of an attribute (M, V, 3); empty if a target has none."""
-        self._accessors.budget.add(2 * 8 * len(targets) * vertices * 3)  # concatenated with those of other primitives
+        self._accessors.budget.add(8 * len(targets) * vertices * 3)
         result = np.zeros((len(targets), vertices, 3))
         for i, target in enumerate(targets):
             if attribute in target:
@@ -140,6 +146,44 @@ class Meshes:
         else:
             indices = np.arange(vertices)
         return _triangles(indices, primitive.get("mode", TRIANGLES))
+
+
+def _stored(primitive: Json) -> str:
+    """JSON of all that a primitive's vertices and faces are read from."""
+    draco = primitive.get("extensions", {}).get(DRACO)
+    return repr([*map(primitive.get, ("attributes", "indices", "mode", "targets")), draco])
+
+
+def _num_bytes(mesh: Mesh) -> int:
+    arrays = mesh.positions, mesh.faces, mesh.joints, mesh.weights, mesh.targets, mesh.normal_targets
+    return sum(each.nbytes for each in arrays if each is not None)
+
+
+def _material(primitive: Json) -> int:
+    material = primitive.get("material")
+    return material if type(material) is int else -1
+
+
+def _join(parts: list[Mesh], targets: int) -> Mesh:
+    """Primitives one after another. targets: number of morph targets."""
+    offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
+    influences = max((part.joints.shape[1] for part in parts), default=0)
+    faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=False)]
+    return Mesh(
+        "",
+        np.concatenate([np.empty((0, 3)), *(part.positions for part in parts)]),
+        np.concatenate([np.empty((0, 3), np.int64), *faces]),
+        _stack([part.joints for part in parts], influences, np.int64),
+        _stack([part.weights for part in parts], influences, np.float64),
+        np.concatenate([np.empty((targets, 0, 3)), *(part.targets for part in parts)], axis=1),
+        np.zeros(targets),
+        _of_all([part.normals for part in parts]),
+        _targets_of_all([(part.normal_targets, part.targets) for part in parts]),
+        tuple(primitive for part in parts for primitive in part.primitives),
+        _of_all([part.tangents for part in parts]),
+        _targets_of_all([(part.tangent_targets, part.targets) for part in parts]),
+        _sums_of_all(parts),
+    )
 
 
 def _triangles(indices: Ints, mode: int) -> Ints:

@@ -11,12 +11,15 @@ import pytest
 import trimesh
 
 import fixtures
-from anim.errors import FormatError
+from anim import memory
+from anim.errors import FormatError, UnsupportedError
 from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
 from anim.model import Scene
 from anim.sampling import rest_world
 from fixtures.broken.pieces import buffered, text
 from tests.anim.gltf.pieces import CORNERS, triangle
+from tests.calls import count_calls
 from tests.files import opened, opened_fixture, opened_path
 
 Json = dict[str, Any]
@@ -70,6 +73,33 @@ def test_primitives_stand_one_after_another() -> None:
     assert mesh.name == "two"
     assert mesh.positions.tolist() == [*CORNERS, [5, 5, 5], *CORNERS]
     assert mesh.faces.tolist() == [[0, 1, 2], [4, 5, 6]]
+
+
+def test_meshes_and_primitives_of_the_same_accessors_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = triangle(targets=1)
+    primitive = content["meshes"][0]["primitives"][0]
+    content["materials"] = [{}, {}]
+    parts = [{**primitive, "material": i} for i in range(2)]
+    content["meshes"] = [{"name": f"m{i}", "weights": [i], "primitives": [parts[i]]} for i in range(2)]
+    content["meshes"].append({"primitives": parts})
+    content["nodes"] = [{"mesh": i} for i in range(3)]
+    counted = count_calls(monkeypatch, Accessors, "floats")
+    one, other, both = (each.mesh for each in reader.scene(opened(text(content))).instances)
+    assert len(counted) == 4  # position and target, of the first mesh and of the last one
+    assert other.positions is one.positions
+    assert other.targets is one.targets
+    assert [one.name, other.name, both.name] == ["m0", "m1", ""]
+    assert [each.rest_weights.tolist() for each in (one, other, both)] == [[0], [1], [0]]
+    assert [each.material for mesh in (one, other, both) for each in mesh.primitives] == [0, 1, 0, 1]
+    np.testing.assert_array_equal(both.positions, np.concatenate([one.positions] * 2))
+    np.testing.assert_array_equal(both.faces, np.concatenate([one.faces, one.faces + len(one.positions)]))
+
+
+def test_joined_primitives_are_counted_before_they_are_allocated() -> None:
+    content = triangle()
+    content["meshes"][0]["primitives"] *= 100
+    with memory.memory_limit(5_000), pytest.raises(UnsupportedError, match="mesh 0: decoded data"):
+        reader.scene(opened(text(content)))
 
 
 def test_influences_are_read_from_all_sets_and_unused_ones_are_joint_0() -> None:
