@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
 Bytes: TypeAlias = NDArray[np.uint8]
+Number = TypeVar("Number", np.float64, np.int64)
 
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
 
@@ -72,7 +73,7 @@ def check_shape(array: AnyArray, shape: str, *, name: str = "array") -> None:
         raise ShapeError(f"{name} has shape {array.shape} (expected ({', '.join(shape.split())}))")
 
 
-def unique_sorted(values: Floats) -> Floats:
+def unique_sorted(values: NDArray[Number]) -> NDArray[Number]:
     """Return the distinct values in increasing order (np.unique loads a quarter of numpy for that)."""
     ordered = np.sort(values)
     return ordered[np.concatenate(([True], ordered[1:] > ordered[:-1]))] if len(ordered) else ordered

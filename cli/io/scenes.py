@@ -32,13 +32,25 @@ def read_scene(
     normals, tangents: whether to read those too. nodes: gives the nodes of the command's meshes; None for all.
     """
     found = reader.scene(document, accessors, skeleton, normals=normals, tangents=tangents)
-    chosen = nodes(found)
+    warn_of_scene(found, document, name, reporter, accessors=accessors, chosen=nodes(found))
+    return found
+
+
+def warn_of_scene(
+    found: Scene,
+    document: Document,
+    name: str,
+    reporter: Reporter,
+    *,
+    accessors: Accessors | None = None,
+    chosen: Collection[int] | None = None,
+) -> None:
+    """Give the warnings of `read_scene` for the scene of a document. chosen: nodes of the command's meshes."""
     for bad in unnormalized_weights(each for each in found.instances if chosen is None or each.node in chosen):
         for words in bad.in_words():
             reporter.warn(f"{name}: {words}")
     _warn_of_copies(document, name, reporter, chosen)
     _warn_of_weight_pointers(document, found.skeleton, name, reporter, accessors)
-    return found
 
 
 def _warn_of_weight_pointers(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 from anim.errors import AnimError
@@ -78,7 +78,7 @@ def edit_clips(
         clips = reader.clips(document, accessors)
         skeleton = reader.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
-        scene = cache(lambda: _scene(document, accessors, skeleton))
+        scene = cache(partial(_scene, document, accessors, skeleton))
         first = range(len(chosen)) if every_clip else first_equal([(clips[i],) for i in chosen])
         new: dict[int, Clip] = {}
         for i, n in zip(chosen, first, strict=True):
@@ -86,7 +86,7 @@ def edit_clips(
                 new[i] = repeat_change(clips[i], clips[chosen[n]], new[chosen[n]])
                 continue
             try:
-                new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), scene)
+                new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), lambda: scene()[0])
             except AnimError as error:
                 raise error.at(reader.clip_label(clips[i].name, i)).advise(advise(clips[i], i)) from None
         stale = badly_stored(document.json)
@@ -99,7 +99,7 @@ def edit_clips(
         if not new:
             pass
         elif measure:
-            edited = _measured(edited, source, accessors, skeleton, reporter)
+            edited = _measured(edited, source, scene, accessors, reporter)
         else:
             for i, clip in edited.before.items():
                 reporter.verbose_info(
@@ -126,12 +126,12 @@ def check_clips(path: str, selection: Selection, reporter: text.Reporter) -> Non
             selection.chosen_clips(reader.names(source.document))
 
 
-def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> Scene:
-    """The scene, without meshes if their vertices can't be read."""
+def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> tuple[Scene, AnimError | None]:
+    """The scene; without meshes, and the reason, if their vertices can't be read."""
     try:
-        return reader.scene(document, accessors, skeleton)
-    except AnimError:  # reported by `_measured`
-        return Scene(skeleton, ())
+        return reader.scene(document, accessors, skeleton), None
+    except AnimError as error:  # unreadable vertices don't prevent a change of keys
+        return Scene(skeleton, ()), error
 
 
 def _is_same(new: Clip, old: Clip) -> bool:
@@ -139,15 +139,18 @@ def _is_same(new: Clip, old: Clip) -> bool:
 
 
 def _measured(
-    edited: EditResult, source: Source, accessors: Accessors, skeleton: Skeleton, reporter: text.Reporter
+    edited: EditResult,
+    source: Source,
+    read: Callable[[], tuple[Scene, AnimError | None]],
+    accessors: Accessors,
+    reporter: text.Reporter,
 ) -> EditResult:
-    at_nodes = False
-    try:
-        scene = scenes.read_scene(source.document, source.name, reporter, accessors=accessors, skeleton=skeleton)
-    except AnimError as error:  # unreadable vertices don't prevent a change of keys
+    scene, error = read()
+    if error is None:
+        scenes.warn_of_scene(scene, source.document, source.name, reporter, accessors=accessors)
+    else:
         hint = f" ({error.help})" if error.help else ""
         reporter.warn(f"measured at nodes, not on the surface: {error}{hint}")
-        scene, at_nodes = Scene(skeleton, ()), True
     prover = Prover(ErrorMetric(scene, clips=(*edited.before.values(), *edited.after.values())))
     measured: list[Proof] = []
     first = first_equal([(before, edited.after[i]) for i, before in edited.before.items()])
@@ -164,7 +167,7 @@ def _measured(
         reporter.verbose_info(
             f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}"
         )
-    return EditResult(edited.before, edited.after, _worst(measured), prover.ruler.diagonal, at_nodes)
+    return EditResult(edited.before, edited.after, _worst(measured), prover.ruler.diagonal, error is not None)
 
 
 def _worst(measured: list[Proof]) -> Proof | None:

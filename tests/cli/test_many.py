@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats, Ints
+from anim.gltf.reading import reader
 from anim.maths import euler, hierarchy
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
@@ -277,3 +278,12 @@ def test_skinned_meshes_share_the_poses_of_the_skeleton(
         sizes.append(len(counted))
         monkeypatch.undo()
     assert sizes[0] == sizes[1] > 0
+
+
+def test_a_scene_is_read_once_for_change_and_measure(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.side_meshes(3))
+    counted = count_calls(monkeypatch, reader, "scene")
+    call("loop", tmp_path / "in.glb", tmp_path / "out.glb", "--blend", "0.1").product()
+    assert len(counted) == 1

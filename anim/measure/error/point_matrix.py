@@ -6,7 +6,7 @@ per node (x, y, z and 1 of w·b·p), the displacements of all vertices at all ti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Floats, Ints, unique_sorted
 from anim.measure.error.orientation_probes import shell_points as shells_of
-from anim.measure.error.surface import Surface, has_vertices, surfaces
+from anim.measure.error.surface import Surface, has_vertices, merge_small, surfaces
 from anim.model import Scene
 
 CARRIED = 0.1  # minimum weight with which a vertex represents a node
@@ -176,17 +176,22 @@ def sample_points(
     on it, and of all with a noticeable weight. extra: further vertices, (index of the surface, index of the vertex).
     """
     found = surfaces(scene) if has_vertices(scene) else []
-    parts = []
-    for number, surface in enumerate(found):
-        wanted = extreme_vertices(surface) | {vertex for owner, vertex in extra if owner == number}
+    firsts = np.cumsum([0, *(len(surface.points) for surface in found)])
+    more = np.array([firsts[owner] + vertex for owner, vertex in extra], np.int64)
+    parts, start = [], 0
+    for surface in merge_small(found):
+        end = start + len(surface.points)
+        wanted = extreme_vertices(surface) | set((more[(start <= more) & (more < end)] - start).tolist())
         parts.append(_of_surface(surface, np.array(sorted(wanted), np.int64)))
+        start = end
     return _joined([*parts, *_shells(scene, shells, radius)])
 
 
 def all_points(scene: Scene, radius: float) -> PointMatrix:
     """Return all vertices of the scene by surface; without vertices, six points around every node."""
     if has_vertices(scene):
-        return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in surfaces(scene)])
+        found = merge_small(surfaces(scene))
+        return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in found])
     return _joined(_shells(scene, frozenset(range(len(scene.skeleton))), radius))
 
 
@@ -222,15 +227,26 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
 def extreme_vertices(surface: Surface) -> set[int]:
     """Return the indices of the outermost vertices of each joint's part of a surface."""
     chosen: set[int] = set()
-    most = surface.joints[np.arange(len(surface.points)), surface.weights.argmax(axis=1)]
-    noticed = surface.weights > CARRIED
-    for joint in sorted(set(surface.joints[surface.weights > 0].tolist())):
-        here = ((surface.joints == joint) & noticed).any(axis=1)
-        for mine in (np.flatnonzero(most == joint), np.flatnonzero(here)):
-            if len(mine):
-                local = surface.points[mine] @ surface.bind[joint][:, :3].T
-                chosen.update(mine[(local @ ALL_DIRECTIONS.T).argmax(axis=0)].tolist())
+    every = np.arange(len(surface.points))
+    used = np.flatnonzero(np.bincount(surface.joints[surface.weights > 0]))
+    most = surface.joints[every, surface.weights.argmax(axis=1)]
+    vertices, places = np.nonzero(surface.weights > CARRIED)
+    noticed = surface.joints[vertices, places]
+    of_joints = zip(used, _by_joint(used, most, every), _by_joint(used, noticed, vertices), strict=True)
+    for joint, mine, here in of_joints:
+        for some in (mine,) if np.array_equal(mine, here) else (mine, here):
+            if len(some):
+                local = surface.points[some] @ surface.bind[joint][:, :3].T
+                chosen.update(some[(local @ ALL_DIRECTIONS.T).argmax(axis=0)].tolist())
     return chosen
+
+
+def _by_joint(wanted: Ints, joints: Ints, vertices: Ints) -> Iterator[Ints]:
+    """For each wanted joint the vertices (increasing) beside which it stands in `joints` (P,)."""
+    size = int(vertices.max(initial=0)) + 1
+    pairs = unique_sorted(joints * size + vertices)
+    ends = np.searchsorted(pairs, [wanted * size, (wanted + 1) * size])
+    return (pairs[start:end] % size for start, end in ends.T.tolist())
 
 
 def _of_surface(surface: Surface, vertices: Ints) -> tuple[Ints, Floats]:

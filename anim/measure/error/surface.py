@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import accumulate, groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from anim.sampling import rest_world
 SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's diagonal
 
 NUM_CORNERS = 8  # of such a cube
+MERGED_POINTS = 1 << 15  # of surfaces that become one: more than costs a few calls of numpy, less than takes memory
 
 
 class Surface(NamedTuple):
@@ -74,12 +76,47 @@ def diagonal(scene: Scene) -> float:
     Of the vertices, skinned and morphed; of the nodes without any vertex.
     """
     world = rest_world(scene.skeleton)
-    meshes = _of_instances(scene)
-    points = [place_points(surface, world[surface.nodes], surface.rest_weights) for surface in meshes] or [
-        world[:, :, 3]
-    ]
-    every = np.concatenate(points)
+    meshes = merge_small(_of_instances(scene))
+    points = [place_points(surface, world[surface.nodes], surface.rest_weights) for surface in meshes]
+    every = np.concatenate(points or [world[:, :, 3]])
     return float(np.linalg.norm(every.max(axis=0) - every.min(axis=0))) if len(every) else 0.0
+
+
+def merge_small(found: Iterable[Surface]) -> Iterator[Surface]:
+    """Yield the same points in the same order, neighbors without morph targets as one surface without a name.
+
+    Only those with equal numbers of influences: work per surface, in files of many, is work per few thousand points.
+    """
+    listed = list(found)
+    starts = accumulate((len(each.points) for each in listed), initial=0)
+    numbered = zip(listed, starts, range(len(listed)), strict=False)
+    for _, run in groupby(numbered, lambda each: _mergeable(*each)):
+        yield _merge([each for each, _, _ in run])
+
+
+def _mergeable(surface: Surface, start: int, number: int) -> tuple[int, int]:
+    """A key that neighbors share which become one surface. start: the number of points before."""
+    if len(surface.rest_weights) or len(surface.points) > MERGED_POINTS:
+        return -1, number
+    return surface.joints.shape[1], start // MERGED_POINTS
+
+
+def _merge(parts: list[Surface]) -> Surface:
+    if len(parts) == 1:
+        return parts[0]
+    sizes = [len(each.points) for each in parts]
+    firsts = np.cumsum([0, *(len(each.nodes) for each in parts[:-1])])
+    return Surface(
+        "",
+        np.concatenate([each.nodes for each in parts]),
+        np.concatenate([each.bind for each in parts]),
+        np.concatenate([each.points for each in parts]),
+        np.empty((0, sum(sizes), 3)),
+        np.concatenate([each.joints for each in parts]) + np.repeat(firsts, sizes)[:, None],
+        np.concatenate([each.weights for each in parts]),
+        -1,
+        np.empty(0),
+    )
 
 
 def place_points(surface: Surface, world: Floats, weights: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,16 @@ from anim.arrays import Floats
 from anim.measure.error import point_matrix as points_
 from anim.measure.error.point_matrix import CARRIED, OneJointRows, PointMatrix, all_points, sample_points, stack_points
 from anim.measure.error.surface import surfaces
-from anim.model import MeshInstance, Scene
+from anim.model import MeshInstance, Scene, Skin
 from anim.sampling import rest_pose, world_matrices
 from tests.anim.optimization.making import JOINTS, every_point, scene
 from tests.anim.skinning.scenes import looped, mesh
 from tests.anim.skinning.scenes import scene as made
+from tests.calls import count_calls
 from tests.clips import skeleton
 
 RNG = np.random.default_rng(3)
+NONE = np.zeros(0)
 
 
 def _world(of: Scene, frames: int = 4) -> Floats:
@@ -161,3 +164,26 @@ def test_rows_of_one_joint_are_those_of_a_sparse_matrix(kind: type[np.floating[A
     found = OneJointRows(joints, factors).astype(kind) @ columns
     assert found.dtype == kind
     assert (found == sparse @ columns).all()
+
+
+def test_small_surfaces_are_measured_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Skins with other bind poses, two meshes without a skin, one with morph targets between: the same points."""
+    instances = [
+        MeshInstance(0, mesh(RNG.normal(size=(5, 3)), [[0, 1]] * 5, [[0.25, 0.75]] * 5), Skin(np.arange(2), bind), NONE)
+        for bind in RNG.normal(size=(2, 2, 3, 4))
+    ]
+    instances += [MeshInstance(i, mesh(RNG.normal(size=(4, 3)), [[]] * 4, [[]] * 4), None, NONE) for i in (1, 2)]
+    targets = RNG.normal(size=(1, 3, 3))
+    morphed = replace(mesh(RNG.normal(size=(3, 3)), [[]] * 3, [[]] * 3), targets=targets, rest_weights=np.ones(1))
+    instances.insert(3, MeshInstance(0, morphed, None, np.ones(1)))
+    of = Scene(skeleton([-1, 0, 1]), tuple(instances))
+    extra = {(1, 2), (3, 0), (4, 3)}
+    together = all_points(of, 0.0), sample_points(of, set(), 0.0, extra)
+    counted = count_calls(monkeypatch, points_, "_of_surface")
+    all_points(of, 0.0)
+    assert len(counted) == 4
+    monkeypatch.setattr(points_, "merge_small", list)
+    for found, alone in zip(together, (all_points(of, 0.0), sample_points(of, set(), 0.0, extra)), strict=True):
+        np.testing.assert_array_equal(found.nodes, alone.nodes)
+        np.testing.assert_array_equal(found.joints, alone.joints)
+        np.testing.assert_array_equal(found.factors, alone.factors)
