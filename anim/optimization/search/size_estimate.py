@@ -43,6 +43,10 @@ class SizeEstimate:
                 moving[name] = min(moving.get(name, size), size)
         return self._overhead(actions, axes, len(moving)) + sum(moving.values())
 
+    def storage_level(self, track: int, tolerance: float) -> int:
+        """Return a number that is equal for tolerances with which the keys of a track are stored equally."""
+        return self._coding.storage_level(self._paths[track], tolerance)
+
     def _overhead(self, actions: Ints, axes: Sequence[SharedAxis], num_moving: int) -> float:
         """Bytes of JSON and of time axes, if `num_moving` tracks have keys of their own."""
         prices = self._coding.byte_costs

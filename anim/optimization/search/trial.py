@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -21,6 +21,7 @@ from anim.optimization.search.plan import Plan, RotationTarget, TrackAction, Tri
 from anim.optimization.search.size_estimate import SizeEstimate
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion, farthest
 from anim.optimization.search.time_axes import SharedAxis, TimeAxisSearch
+from anim.optimization.search.trial_cache import TrialCache
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
 from anim.sampling.world import local_matrices
@@ -64,6 +65,7 @@ class TrialRunner:
         self._constants = _constant_errors(source, shared)
         self._layouts = TimeAxisSearch(source, coding, self._bound)
         self._candidates = Candidates(source, coding.packing)
+        self._results = TrialCache()
 
     def run(self, plan: Plan, *, smaller_than: float = math.inf) -> TrialResult:
         """Return the result of a plan.
@@ -84,8 +86,13 @@ class TrialRunner:
         ).tolist()
         if self._sizes.min_size(actions, axes, tolerances) >= limit:
             return None
+        constants = self._choose_constants(actions, plan)
+        name = self._name(plan.rotation_target, actions, constants, axes, tolerances)
+        known = self._results.get(name)
+        if known is not None and (known.worst > 1 or known.size >= smaller_than):
+            return None if known.size >= limit else replace(known, plan=plan)
         shown = [part.copy() for part in self.source.local]
-        keys = self._single_key(actions, plan, shown)
+        keys = self._single_key(actions, constants, shown)
         for i, candidate in self._key_candidates(plan.rotation_target, axes, tolerances, shown[ROTATION]):
             keys[i] = candidate.stored
             shown[self._paths[i]][self._nodes[i]] = candidate.shown
@@ -95,6 +102,7 @@ class TrialRunner:
             return None
         usage = self._usage
         outcome = TrialResult(plan, actions, keys, on, usage.slerp_raw(shown), usage.own(shown), size)
+        self._results.add(name, outcome)
         if outcome.worst > 1 or size >= smaller_than or not self._chords_matter(axes, keys):
             return outcome
         return replace(outcome, usage=np.maximum(outcome.usage, self._nlerp_usage(axes, keys, shown)))
@@ -127,23 +135,42 @@ class TrialRunner:
         actions[(self._from_rest <= allowance) & self._droppable] = TrackAction.DROPPED
         return actions
 
-    def _single_key(self, actions: Ints, plan: Plan, shown: list[Floats]) -> dict[int, EncodedKeys]:
+    def _choose_constants(self, actions: Ints, plan: Plan) -> dict[int, int]:
+        """The number of the value of each constant track: of other clips, else the rest value, else the middle."""
+        constant = np.flatnonzero(actions == TrackAction.CONSTANT)
+        allowances = np.maximum(CONSTANT_BUDGET_FACTOR * plan.budgets[constant], plan.threshold)
+        return {
+            i: next((n for n, (_, error) in enumerate(self._constants[i]) if error <= allowance), -1)
+            for i, allowance in zip(constant.tolist(), allowances.tolist(), strict=True)
+        }
+
+    def _name(
+        self,
+        target: RotationTarget,
+        actions: Ints,
+        constants: dict[int, int],
+        axes: Sequence[SharedAxis],
+        tolerances: Sequence[float],
+    ) -> Hashable:
+        """A value that is equal for trials with equal results."""
+        return (
+            target,
+            actions.tobytes(),
+            tuple(constants.values()),
+            tuple((axis.keys.tobytes(), axis.members) for axis in axes),
+            tuple(self._sizes.storage_level(i, tolerances[i]) for axis in axes for i in axis.members),
+        )
+
+    def _single_key(self, actions: Ints, constants: dict[int, int], shown: list[Floats]) -> dict[int, EncodedKeys]:
         """Single keys of constant tracks; writes them and the rest values of dropped tracks to `shown`."""
         for path, rest in enumerate(self._rest):
             gone = np.flatnonzero((actions == TrackAction.DROPPED) & (self._paths == path))
             shown[path][self._nodes[gone]] = rest[gone][:, None]
         keys = {}
-        constant = np.flatnonzero(actions == TrackAction.CONSTANT)
-        allowances = np.maximum(CONSTANT_BUDGET_FACTOR * plan.budgets[constant], plan.threshold)
-        for i, allowance in zip(constant.tolist(), allowances.tolist(), strict=True):
-            keys[i] = self._constant(i, allowance)
+        for i, number in constants.items():
+            keys[i] = quantization.constant_cost(self._constants[i][number][0])
             shown[self._paths[i]][self._nodes[i]] = keys[i].values[0]
         return keys
-
-    def _constant(self, i: int, allowance: float) -> EncodedKeys:
-        """The key of a constant track: the value of other clips, else the rest value, else the middle."""
-        value = next((value for value, error in self._constants[i] if error <= allowance), self._constants[i][-1][0])
-        return quantization.constant_cost(value)
 
     def _chords_matter(self, axes: list[SharedAxis], keys: dict[int, EncodedKeys]) -> bool:
         for axis in axes:

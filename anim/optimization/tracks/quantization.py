@@ -24,6 +24,8 @@ FILTER_ERROR_STEPS = (
     2.45 / 4
 )  # error of that filter times its largest integer: √3 components by half a step, and √2 / 2
 EXPONENT_ERROR_STEPS = 1.5 / 2  # error of meshopt's exponential filter, in its powers of two
+MIN_EXPONENT = -40  # of that filter, for tolerance 0
+MAX_EXPONENT = 1024  # above the power of two of any float64
 MANTISSA_BITS = 22  # of meshopt's exponential filter, without the sign
 
 
@@ -81,6 +83,14 @@ class Encoding:
         if self.packing is not Packing.CORE:
             return 0.0
         return count * (4 * 2 if is_int16(path, tolerance, count) else 4 * NUM_COMPONENTS[path])
+
+    def storage_level(self, path: str, tolerance: float) -> int:
+        """Return a number that is equal for tolerances with which `choose_format` chooses equally for any keys."""
+        if self.packing is Packing.CORE:
+            return int(tolerance >= MIN_INT16_ERROR)
+        if path == "rotation" and tolerance >= MIN_FILTER_ERROR:
+            return MAX_EXPONENT + filter_bits(tolerance)
+        return _tolerated_exponent(tolerance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +156,8 @@ def encode(values: Floats, form: Form) -> EncodedKeys:
 def encode_all(values: Sequence[Floats], forms: Sequence[Form]) -> list[EncodedKeys]:
     """Return the keys (K, C) of each track in its format; all quaternions are decoded in one call."""
     filtered = [i for i, (kind, _) in enumerate(forms) if kind == "quaternion"]
+    if not filtered:
+        return [encode(keys, form) for keys, form in zip(values, forms, strict=True)]
     codes = [_quaternion_codes(values[i], forms[i][1]) for i in filtered]
     decoded = np.split(_decode_quaternions(b"".join(codes)), np.cumsum([len(each) // 8 for each in codes])[:-1])
     tolerances = [FILTER_ERROR_STEPS / ((1 << (forms[i][1] - 1)) - 1) for i in filtered]
@@ -167,9 +179,14 @@ def filter_bits(tolerance: float) -> int:
 
 def exponent(values: Floats, tolerance: float) -> int:
     """Return the power of two for rounding errors up to `tolerance`, within a mantissa of 23 bits."""
-    wanted = math.floor(math.log2(tolerance / EXPONENT_ERROR_STEPS)) if tolerance > 0 else -40
+    wanted = _tolerated_exponent(tolerance)
     largest = float(np.abs(values).max(initial=1e-9)) or 1e-9
     return max(wanted, math.ceil(math.log2(largest)) - MANTISSA_BITS)
+
+
+def _tolerated_exponent(tolerance: float) -> int:
+    """The largest power of two for rounding errors up to `tolerance`."""
+    return math.floor(math.log2(tolerance / EXPONENT_ERROR_STEPS)) if tolerance > 0 else MIN_EXPONENT
 
 
 def compressed_size(streams: Sequence[Sequence[EncodedKeys]], packing: Packing) -> int:

@@ -17,12 +17,13 @@ from anim.model import Clip, Scene
 from anim.optimization.options import Bounds
 from anim.optimization.search import time_axes
 from anim.optimization.search.candidates import Candidates
-from anim.optimization.search.plan import Plan, TrackAction, TrialResult
+from anim.optimization.search.plan import Plan, RotationTarget, TrackAction, TrialResult
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.search.time_axes import LAYOUTS, SharedAxis
 from anim.optimization.search.trial import BoundUsage, TrialRunner
 from anim.sampling import sample_pose
 from tests.anim.optimization.making import CORE, every_point, scene, truth_of, turning, waving
+from tests.calls import count_calls
 from tests.clips import clip, track
 
 OF = scene()
@@ -195,3 +196,17 @@ def test_results_that_are_not_smaller_are_not_measured(monkeypatch: pytest.Monke
     assert not measured
     assert runner.run_smaller(plan, full.size + 1) is not None
     assert measured
+
+
+@pytest.mark.parametrize("target", RotationTarget)
+def test_equal_decisions_are_measured_once(monkeypatch: pytest.MonkeyPatch, target: RotationTarget) -> None:
+    plans = [_plan(runner := _bench(waving()), each * BOUND, rotation_target=target) for each in (1, 1.1, 2)]
+    fresh = [_bench(waving()).run(plan, smaller_than=0) for plan in plans]
+    counted = count_calls(monkeypatch, BoundUsage, "slerp_raw")
+    found = [runner.run(plan, smaller_than=0) for plan in plans]
+    assert len(counted) == 2
+    for one, other in zip(found, fresh, strict=True):
+        assert (one.size, one.plan is other.plan) == (other.size, True)
+        np.testing.assert_array_equal(one.usage, other.usage)
+        assert {i: each.name for i, each in one.keys.items()} == {i: each.name for i, each in other.keys.items()}
+    assert runner.run_smaller(plans[1], found[1].size) is None

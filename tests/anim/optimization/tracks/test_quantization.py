@@ -98,6 +98,20 @@ def test_compressed_forms(path: str, miss: float, expected: str) -> None:
         assert quantization.choose_format(TURNS, path, miss, packing)[0] == expected
 
 
+@pytest.mark.parametrize("packing", Packing)
+@pytest.mark.parametrize("path", ["rotation", "translation"])
+def test_equal_storage_levels_are_equal_forms(path: str, packing: Packing) -> None:
+    tolerances = [0.0, *np.geomspace(1e-12, 1e3, 400).tolist()]
+    levels = [_coding(packing).storage_level(path, each) for each in tolerances]
+    forms: dict[int, set[quantization.Form]] = {}
+    for scale in (1e-3, 1, 1e3):
+        for level, tolerance in zip(levels, tolerances, strict=True):
+            forms.setdefault(level, set()).add(quantization.choose_format(scale * VECTORS, path, tolerance, packing))
+        assert all(len(each) == 1 for each in forms.values())
+        forms.clear()
+    assert len(set(levels)) < 80
+
+
 def test_sizes_of_core_are_plain() -> None:
     parts = [quantization.encode(TURNS[:5], ("int16", 0)), quantization.encode(VECTORS[:7], ("float32", 0))]
     assert _coding(Packing.CORE).size(parts) == 5 * 8 + 7 * 12
