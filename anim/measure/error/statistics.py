@@ -13,7 +13,7 @@ from anim.measure.error.displacement import lengths_by_group, max_displacement
 from anim.measure.error.merged_groups import MergedGroups
 from anim.measure.error.metric import MAX_SEARCHED, Block, ErrorMetric
 from anim.measure.error.point_groups import PointGroups
-from anim.measure.error.sample_times import FPS, dense_times
+from anim.measure.error.sample_times import FPS, SAME_MOMENT, dense_times
 from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
 from anim.sampling.times import frame_times
@@ -80,19 +80,29 @@ def statistics(
     found = [each for each in found if len(each)] or [np.zeros(1)]
     every = found.pop() if len(found) == 1 else np.concatenate(found)
     found.clear()
-    speed = speed_error(ruler, before, after, player=player, fps=fps)
+    speed = speed_error(ruler, before, after, player=player, fps=fps, block=block)
     mean = float(every.mean())
     return Statistics(mean, _percentile(every, 0.99), angle, speed, weight)
 
 
-def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = "spec", fps: float = FPS) -> Peak:
+def speed_error(
+    ruler: ErrorMetric,
+    before: Clip,
+    after: Clip,
+    *,
+    player: str = "spec",
+    fps: float = FPS,
+    block: Block | None = None,
+) -> Peak:
     """Return the largest difference in a vertex's velocity, m/s, by differences over a grid of `fps`.
 
     It is an upper bound on that grid, at most 1 % above the true one. time: the middle of the frame's step.
+    block: poses at other times too, if the caller has them: those of the grid are taken from it where it has them.
     """
     times = frame_times(0.0, max(before.end, after.end), fps=fps)
+    taken = None if block is None else _take_grid(block, times)
     worst = Peak()
-    for block in ruler.blocks(before, after, times, player=player, overlap=1):
+    for block in ruler.blocks(before, after, times, player=player, overlap=1) if taken is None else [taken]:
         step = np.diff(block.times)
         if not len(step):
             continue
@@ -108,6 +118,19 @@ def speed_error(ruler: ErrorMetric, before: Clip, after: Clip, *, player: str = 
                 time = float(block.times[top.frame] + block.times[top.frame + 1]) / 2
                 worst = Peak(top.length, time, part.name_of(top) or joint, joint, part.vertex(top))
     return worst
+
+
+def _take_grid(block: Block, times: Floats) -> Block | None:
+    """The block's poses at times (F,), which may differ by rounding; None if one is missing.
+
+    Times before the block's first are left out: nothing moves before the first key.
+    """
+    times = times[times >= block.times[0] - SAME_MOMENT]
+    after = np.minimum(np.searchsorted(block.times, times), len(block.times) - 1)
+    ahead = np.maximum(after - 1, 0)
+    frames = np.where(times - block.times[ahead] < block.times[after] - times, ahead, after)
+    is_grid = (np.abs(block.times[frames] - times) <= SAME_MOMENT).all() and (np.diff(frames) > 0).all()
+    return _take(block, frames) if is_grid and len(frames) else None
 
 
 def _take(block: Block, frames: Ints) -> Block:

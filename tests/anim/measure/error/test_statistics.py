@@ -47,7 +47,20 @@ def test_poses_of_the_error_give_the_same_statistics(versions: tuple[Scene, Clip
     assert block is not None
     assert len(times) > FRAMES
     alone = statistics(ruler, before, after, times=times, player=player)
-    assert statistics(ruler, before, after, times=times, block=block, player=player) == alone
+    found = statistics(ruler, before, after, times=times, block=block, player=player)
+    assert found._replace(speed=alone.speed) == alone
+    assert found.speed.size == pytest.approx(alone.speed.size, rel=1e-5)  # of keys within 1 µs of the frames
+
+
+def test_speeds_are_of_the_grid_alone(versions: tuple[Scene, Clip, Clip]) -> None:
+    """Poses between its frames are left out; without one of its frames it is posed itself."""
+    scene, before, after = versions
+    ruler, times = ErrorMetric(scene), dense_times(before, after, fps=40)
+    block = ruler.sample_errors(before, after, times).block
+    for fps in (40, 41):
+        alone = speed_error(ruler, before, after, fps=fps)
+        found = speed_error(ruler, before, after, fps=fps, block=block)
+        assert found.size == pytest.approx(alone.size, rel=1e-5)
 
 
 def test_only_poses_of_one_player_and_block_are_kept(
