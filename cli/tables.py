@@ -14,11 +14,14 @@ def text(header: Sequence[str], rows: Sequence[Sequence[Cell]], *, left: int = 1
 
     A column in which every cell is empty is left out.
     """
-    cells = [[_shown(cell) for cell in row] for row in rows]
-    kept = [i for i in range(len(header)) if any(row[i] for row in cells)]
-    widths = {i: max(len(header[i]), *(len(row[i]) for row in cells)) for i in kept}
-    line = (indent + "  ".join(f"{{{i}:{'<' if i < left else '>'}{widths[i]}}}" for i in kept)).format
-    return "\n".join(line(*row).rstrip() for row in [list(header), *cells]) + "\n"
+    columns = [_shown_column(column) for column in zip(*rows, strict=True)]
+    kept = [i for i, column in enumerate(columns) if any(column)]
+    aligned: list[list[str]] = []
+    for i in kept:
+        width = max(len(header[i]), *map(len, columns[i]))
+        align = str.ljust if i < left else str.rjust
+        aligned.append([align(cell, width) for cell in (header[i], *columns[i])])
+    return "\n".join([(indent + "  ".join(line)).rstrip() for line in zip(*aligned, strict=True)]) + "\n"
 
 
 def comma_separated(header: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
@@ -48,11 +51,14 @@ def cut_middle(words: str, length: int = MAX_QUOTED_LENGTH) -> str:
     return f"{words[: length - end - 1]}…{words[-end:]}"
 
 
+def _shown_column(cells: Sequence[Cell]) -> list[str]:
+    shown = [cell if type(cell) is str else _shown(cell) for cell in cells]
+    return shown if "".join(shown).isprintable() else list(map(escape_control, shown))
+
+
 def _shown(cell: Cell) -> str:
-    if type(cell) is str:  # most cells
-        return cell if cell.isprintable() else escape_control(cell)
     if cell is None or cell is False:
         return ""
     if cell is True:
         return "yes"
-    return f"{cell:g}" if isinstance(cell, float) else escape_control(str(cell))
+    return f"{cell:g}" if isinstance(cell, float) else str(cell)

@@ -101,7 +101,7 @@ class CheckedFile:
     def _tracks_by_path(self) -> dict[str, list[tuple[int, Track]]]:
         """Tracks with a node of the chosen clips, with the indices of their clips."""
         found: dict[str, list[tuple[int, Track]]] = {}
-        for report, clip in self.clips():
+        for report, clip in self.clips:
             for track in clip.tracks:
                 if track.node is not None:
                     found.setdefault(track.path, []).append((report.index, track))
@@ -139,10 +139,10 @@ class CheckedFile:
             node, time_s = at.get(number, (None, None))  # without one: tracks of pointers
             yield self.in_clip(number, counts[number], time_s=time_s, node=node)
 
-    def clips(self) -> Iterator[tuple[ClipReport, Clip]]:
-        """Yield the chosen, readable clips with their reports."""
-        for report in self.facts.clips:
-            yield report, self.contents.clips[report.index]
+    @cached_property
+    def clips(self) -> list[tuple[ClipReport, Clip]]:
+        """The chosen, readable clips with their reports."""
+        return [(report, self.contents.clips[report.index]) for report in self.facts.clips]
 
     def in_clip(
         self,

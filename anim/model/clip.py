@@ -31,8 +31,8 @@ class Clip:
             raise ShapeError(f"name is {self.name!r} (expected text, empty for none)")
         if not isinstance(self.tracks, tuple):
             object.__setattr__(self, "tracks", _as_tuple(self.tracks))
-        if strange := next((each for each in self.tracks if not isinstance(each, Track)), None):
-            raise ShapeError(f"tracks hold {type(strange).__name__} (expected Track)")
+        if strange := [each for each in self.tracks if not isinstance(each, Track)]:
+            raise ShapeError(f"tracks hold {type(strange[0]).__name__} (expected Track)")
         targets = [(track.node, track.path) for track in self.tracks if track.node is not None]
         if len(set(targets)) < len(targets):
             node, path = next(target for target in targets if targets.count(target) > 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -75,6 +75,7 @@ class Track:
     out_tangents: Floats | None
     pointer: str | None
     storage: AccessorFormat
+    _digest: bytes | None = field(init=False, repr=False)  # once asked for
 
     def __init__(
         self,
@@ -92,6 +93,7 @@ class Track:
         set_field(self, "path", path)
         set_field(self, "pointer", pointer)
         set_field(self, "storage", storage)
+        set_field(self, "_digest", None)
         if type(node) is not int or node < 0 or path not in PATHS:  # otherwise the target is valid
             node = _node(node, path)
         set_field(self, "node", node)
@@ -141,6 +143,20 @@ class Track:
 
     def __hash__(self) -> int:
         return hash((self._words, self.values.shape))
+
+    @property
+    def digest(self) -> bytes:
+        """Digest of target, keys and storage, for comparisons of many tracks with each other."""
+        if self._digest is None:
+            import hashlib  # loads OpenSSL, and few files have tracks to compare
+
+            header = repr((*self._words, self.values.shape))
+            digest = hashlib.blake2b(header.encode(errors="surrogatepass"), digest_size=16)
+            for numbers in self._numbers:
+                if numbers is not None:
+                    digest.update(np.ascontiguousarray(numbers).data)
+            object.__setattr__(self, "_digest", digest.digest())
+        return self._digest or b""
 
     @property
     def _words(self) -> tuple[object, ...]:

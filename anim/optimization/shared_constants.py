@@ -46,51 +46,60 @@ def find_constants(context: Context, clips: Sequence[Clip]) -> Constants:
     seen: set[Target] = set()
     values: dict[Target, list[_Value]] = {}
     bound = CONSTANT_TOLERANCE * context.bounds.max_error
-    from_rest = _distances_from_rest(context, clips, meters)
-    for clip, apart in zip(clips, from_rest, strict=True):
-        for track, distance in zip(clip.tracks, apart.tolist(), strict=True):
-            if track.node is None or track.path == "pointer":
-                continue
-            target = (track.node, track.path)
-            if track.path == "weights":
-                seen.add(target)
-                if not _weights_rest(context, track, bound):
-                    moved.add(target)
-                continue
-            seen.add(target)
-            if distance > bound:
+    tracks = [track for clip in clips for track in clip.tracks]
+    from_rest, spread = _distances(context, tracks, meters, bound)
+    for track, distance, spread_m in zip(tracks, from_rest.tolist(), spread.tolist(), strict=True):
+        if track.node is None or track.path == "pointer":
+            continue
+        target = (track.node, track.path)
+        seen.add(target)
+        if track.path == "weights":
+            if not _weights_rest(context, track, bound):
                 moved.add(target)
+        elif distance > bound:
+            moved.add(target)
+            if spread_m <= 2 * bound:  # else too far apart for any constant
                 unit = meters[PATHS.index(track.path)][track.node]
-                if unit * _difference(track, track.values[0]) > 2 * bound:  # too far apart for any constant
-                    continue
                 _count_constant(values.setdefault(target, []), track, unit, bound)
     chosen = {
         target: tuple(each.value for each in sorted(found, key=lambda each: -each.clips))
         for target, found in values.items()
     }
-    return Constants(frozenset(seen - moved), chosen, from_rest)
+    ends = np.cumsum([len(clip.tracks) for clip in clips]).tolist()
+    per_clip = tuple(from_rest[end - len(clip.tracks) : end] for clip, end in zip(clips, ends, strict=True))
+    return Constants(frozenset(seen - moved), chosen, per_clip)
 
 
-def _distances_from_rest(
-    context: Context, clips: Sequence[Clip], meters: tuple[Floats, Floats, Floats]
-) -> tuple[Floats, ...]:
-    """For each clip the largest distance (T,) m of each track's keys from rest; inf for other tracks than of nodes."""
-    tracks = [track for clip in clips for track in clip.tracks]
-    found = np.full(len(tracks), np.inf)
+def _distances(
+    context: Context, tracks: Sequence[Track], meters: tuple[Floats, Floats, Floats], bound: float
+) -> tuple[Floats, Floats]:
+    """Largest distances (T,) m of each track's keys: from rest, and from its first key where that is above `bound`.
+
+    inf for splines that move, and for other tracks than of nodes.
+    """
+    from_rest, spread, units = np.full(len(tracks), np.inf), np.full(len(tracks), np.inf), np.zeros(len(tracks))
     for number, path in enumerate(PATHS):
         mine = [i for i, track in enumerate(tracks) if track.path == path and not _has_tangents(track)]
         rest = getattr(context.skeleton, path)
         for some in _by_keys(mine, tracks):
-            counts = [len(tracks[i].values) for i in some]
             nodes = np.array([tracks[i].node for i in some])
-            values, at_rest = np.concatenate([tracks[i].values for i in some]), np.repeat(rest[nodes], counts, axis=0)
-            apart = np.linalg.norm(values - at_rest, axis=1)
-            if path == "rotation":
-                apart = np.minimum(apart, np.linalg.norm(values + at_rest, axis=1))
-            starts = np.cumsum([0, *counts[:-1]])
-            found[some] = meters[number][nodes] * np.maximum.reduceat(apart, starts)
-    ends = np.cumsum([len(clip.tracks) for clip in clips]).tolist()
-    return tuple(found[end - len(clip.tracks) : end] for clip, end in zip(clips, ends, strict=True))
+            units[some] = meters[number][nodes]
+            from_rest[some] = units[some] * _farthest([tracks[i] for i in some], rest[nodes])
+        for some in _by_keys([i for i in mine if from_rest[i] > bound], tracks):
+            moving = [tracks[i] for i in some]
+            spread[some] = units[some] * _farthest(moving, np.array([track.values[0] for track in moving]))
+    return from_rest, spread
+
+
+def _farthest(tracks: Sequence[Track], origins: Floats) -> Floats:
+    """Largest distance (T,) of the keys of each track from a value of its own (T, C), in its units; of one path."""
+    counts = [len(track.values) for track in tracks]
+    values, origin = np.concatenate([track.values for track in tracks]), np.repeat(origins, counts, axis=0)
+    apart = np.linalg.norm(values - origin, axis=1)
+    if tracks[0].path == "rotation":
+        apart = np.minimum(apart, np.linalg.norm(values + origin, axis=1))
+    farthest: Floats = np.maximum.reduceat(apart, np.cumsum([0, *counts[:-1]]))
+    return farthest
 
 
 def _by_keys(numbers: Sequence[int], tracks: Sequence[Track]) -> Iterator[list[int]]:
@@ -139,13 +148,8 @@ def _count_constant(found: list[_Value], track: Track, unit: float, bound: float
 
 
 def _difference(track: Track, value: Floats) -> float:
-    """Largest distance of the track's keys from a value, in its units; infinite for a spline that moves."""
-    if _has_tangents(track):
-        return float("inf")
-    apart = np.linalg.norm(track.values - value, axis=1)
-    if track.path == "rotation":
-        apart = np.minimum(apart, np.linalg.norm(track.values + value, axis=1))
-    return float(apart.max())
+    """Largest distance of the track's keys from a value, in its units."""
+    return float(_farthest([track], value[None])[0])
 
 
 def _has_tangents(track: Track) -> bool:

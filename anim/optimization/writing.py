@@ -9,6 +9,7 @@ from dataclasses import replace
 from anim.gltf.document import Document
 from anim.gltf.meshopt.storage import FilteredValues, attach_codes
 from anim.gltf.writing import reindex, writer
+from anim.measure.equal_clips import first_equal
 from anim.model import Clip, Track
 from anim.optimization.options import Packing
 from anim.optimization.search.plan import Solution
@@ -35,7 +36,10 @@ def _with_codes(track: Track, stored: EncodedKeys) -> Track:
 
 def changed_clips(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) -> list[int]:
     """Return the indices of the clips that differ from their solution when read from the new document."""
-    return [i for i, each in solutions.items() if not _is_same(read_back[i], each.clip)]
+    pairs = [(read_back[i], each.clip) for i, each in solutions.items()]
+    first = first_equal(pairs)
+    same = {n: _is_same(*pairs[n]) for n in set(first)}
+    return [i for i, n in zip(solutions, first, strict=True) if not same[n]]
 
 
 def _is_same(a: Clip, b: Clip) -> bool:

@@ -11,7 +11,7 @@ import typer
 from anim.errors import AnimError
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
-from anim.measure.equal_clips import first_equal, repeat_change, tracks_digest
+from anim.measure.equal_clips import first_equal, repeat_change, track_digests
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loop, best_ranges
 from anim.measure.loops.recommendations import recommend
@@ -107,7 +107,7 @@ class _Closing:
         self._path = "stdin" if path == documents.PIPE else path
         self._skin: SkinMotion | None = None
         # The first of clips with equal tracks, and its result
-        self._done: dict[bytes, tuple[Clip, Clip | UsageError]] = {}
+        self._done: dict[tuple[bytes, ...], tuple[Clip, Clip | UsageError]] = {}
         self._problems: list[str] = []
         self._poses: list[str] = []
 
@@ -117,7 +117,7 @@ class _Closing:
             self._poses.append(name)
             return clip
         self._skin = self._skin or SkinMotion(scene())
-        key = tracks_digest(clip)
+        key = track_digests(clip)
         if key not in self._done:
             try:
                 self._done[key] = clip, _closed(clip, tracks, self._skin, self._blend)

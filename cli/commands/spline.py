@@ -10,6 +10,7 @@ import typer
 
 from anim.curves.tangents.table import DEFAULT_RULE, TANGENT_FACTORIES, TANGENTS, parse
 from anim.gltf.reading import reader
+from anim.measure.equal_clips import first_equal
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.recommendations import closing_command
 from anim.model import Clip, Scene
@@ -84,7 +85,10 @@ def command(
 
 def _notes(before: Clips, after: Clips) -> Iterator[str]:
     """Yield notes on the largest distance of the curve from its keys."""
-    found = {i: max_key_change(old, after[i]) for i, old in before.items()}
+    pairs = [(old, after[i]) for i, old in before.items()]
+    first = first_equal(pairs)
+    changes = {n: max_key_change(*pairs[n]) for n in set(first)}
+    found = {i: changes[n] for i, n in zip(before, first, strict=True)}
     found = {i: each for i, each in found.items() if each[0] or each[1] > MIN_DEVIATION_RAD}
     if found:
         moved, turned = (max(each[k] for each in found.values()) for k in range(2))

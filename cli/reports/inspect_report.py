@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, TypeVar
 
 from anim.check.finding import Finding, Occurrence
 from anim.gltf.reading.reader import clip_name
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 PATHS = ("translation", "rotation", "scale", "weights", "pointer")
 MIN_ROOT_DISTANCE_M = 1e-4  # smaller displacements of the root show no speed
 MARKS = {"error": "error  ", "warning": "warning", "info": "info   "}
+T = TypeVar("T")
 Smoothness: TypeAlias = "tuple[tuple[TrackContinuity, ...], ...]"  # per clip and track
 
 
@@ -108,37 +109,35 @@ def _headline(name: str, file_bytes: int, facts: Facts) -> str:
 
 def _clips(clips: Sequence[ClipReport]) -> str:
     on_skin = all(clip.seam_measured_on == "skin" for clip in clips)
-    header = ["clip", "seconds", "fps", "T/R/S/W/P", "keys", "interp", "bytes", "share"]
-    header += [
-        "constant",
-        "no-op",
-        "redundant",
-        "loop gap" if on_skin else "loop gap (nodes)",
-        "velocity gap",
-        "root speed",
-    ]
-    rows: list[list[Cell]] = []
-    for clip in clips:
-        root_speed = format_speed(clip.root_speed_m_per_s) if clip.root_distance_m > MIN_ROOT_DISTANCE_M else ""
-        rows.append(
-            [
-                clip_name(clip.name, clip.index),
-                format_span(clip.start_s, clip.end_s).removesuffix(" s"),
-                frame_rate(clip),
-                "/".join(str(clip.tracks.get(path, 0)) for path in PATHS),
-                clip.keys,
-                "+".join(name[0] for name in sorted(clip.interpolations)),
-                format_bytes(clip.stored_bytes + clip.json_bytes),
-                f"{100 * clip.share:.1f} %",
-                str(clip.constant_tracks or ""),
-                str(clip.no_effect_tracks or ""),
-                str(clip.redundant_keys or ""),
-                format_length(clip.seam_m),
-                format_speed(clip.seam_speed_m_per_s),
-                root_speed,
-            ]
-        )
-    return tables.text(header, rows)
+    spans = [(clip.start_s, clip.end_s) for clip in clips]
+    speeds = [clip.root_speed_m_per_s if clip.root_distance_m > MIN_ROOT_DISTANCE_M else None for clip in clips]
+    columns: dict[str, list[Cell]] = {
+        "clip": [clip_name(clip.name, clip.index) for clip in clips],
+        "seconds": _each(lambda span: format_span(*span).removesuffix(" s"), spans),
+        "fps": [frame_rate(clip) for clip in clips],
+        "T/R/S/W/P": _each("/".join, [tuple([str(clip.tracks.get(path, 0)) for path in PATHS]) for clip in clips]),
+        "keys": [clip.keys for clip in clips],
+        "interp": ["+".join([name[0] for name in sorted(clip.interpolations)]) for clip in clips],
+        "bytes": _each(format_bytes, [clip.stored_bytes + clip.json_bytes for clip in clips]),
+        "share": _each("{:.1f} %".format, [100 * clip.share for clip in clips]),
+        "constant": _each(_count, [clip.constant_tracks for clip in clips]),
+        "no-op": _each(_count, [clip.no_effect_tracks for clip in clips]),
+        "redundant": _each(_count, [clip.redundant_keys for clip in clips]),
+        "loop gap" if on_skin else "loop gap (nodes)": _each(format_length, [clip.seam_m for clip in clips]),
+        "velocity gap": _each(format_speed, [clip.seam_speed_m_per_s for clip in clips]),
+        "root speed": _each(lambda speed: "" if speed is None else format_speed(speed), speeds),
+    }
+    return tables.text(list(columns), list(zip(*columns.values(), strict=True)))
+
+
+def _each(format: Callable[[T], str], values: Sequence[T]) -> list[Cell]:
+    """The values as text, each distinct one formatted once: clips are many and much alike."""
+    shown = {value: format(value) for value in set(values)}
+    return [shown[value] for value in values]
+
+
+def _count(count: int) -> str:
+    return str(count or "")
 
 
 def frame_rate(clip: ClipReport) -> str:

@@ -24,7 +24,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     rest = motion.points.places(motion.rest_world)
     center, edge = _boxes(rest)
     size = float(edge[0].max())
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         centers, edges = _boxes(motion.places(clip, _times(clip)))
         moved = float(np.sqrt(((centers - center) ** 2).sum(axis=1)).max()) / size if size else 0.0
         grown = float(edges.max()) / size if size else 0.0

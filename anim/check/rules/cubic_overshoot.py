@@ -20,7 +20,7 @@ SAMPLES = np.linspace(0, 1, 17)[1:-1, None, None]  # of a segment: a cubic's ext
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks."""
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         splines = [track for track in clip.tracks if track.interpolation is Interpolation.CUBICSPLINE]
         excesses = [(excess, track) for track in splines if (excess := overshoot(track)) > parameters["excess"]]
         if excesses:

@@ -59,7 +59,7 @@ def _listed(nodes: Sequence[int]) -> str:
 
 def animated_nodes(file: CheckedFile) -> list[int]:
     """Return the indices of the nodes with a track in any chosen clip, sorted."""
-    return sorted({track.node for _, clip in file.clips() for track in clip.tracks if track.node is not None})
+    return sorted({track.node for _, clip in file.clips for track in clip.tracks if track.node is not None})
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

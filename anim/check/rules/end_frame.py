@@ -38,7 +38,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 
 def _end_frames(file: CheckedFile) -> Iterator[tuple[int, Clip, EndFrame]]:
-    clips = [(report.index, clip) for report, clip in file.clips()]
+    clips = [(report.index, clip) for report, clip in file.clips]
     first = first_equal([(clip,) for _, clip in clips])
     distinct = {n: clip for n, (_, clip) in enumerate(clips) if first[n] == n}
     roots = [root_motion_node(file.skeleton, clip) for clip in distinct.values()]

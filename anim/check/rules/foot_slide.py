@@ -43,7 +43,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """
     joints = file.joints or _animated(file)
     feet = [joint for joint in _skinned(file) or joints if re.search(FEET, file.skeleton.names[joint])]
-    for report, clip in file.clips() if feet else ():
+    for report, clip in file.clips if feet else ():
         height, contacts = _contacts(file, clip, joints, feet)
         if not contacts:
             continue
@@ -72,7 +72,7 @@ def _skinned(file: CheckedFile) -> list[int]:
 
 def _animated(file: CheckedFile) -> list[int]:
     """The animated nodes, which are the joints of a file without skins, as of captured motion."""
-    return sorted({track.node for _, clip in file.clips() for track in clip.tracks if track.node is not None})
+    return sorted({track.node for _, clip in file.clips for track in clip.tracks if track.node is not None})
 
 
 def _contacts(file: CheckedFile, clip: Clip, joints: list[int], feet: list[int]) -> tuple[float, list[Contact]]:

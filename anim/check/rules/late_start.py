@@ -22,7 +22,7 @@ MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display sh
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips; for Unity also those with only some late tracks."""
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         if report.start_s > MIN_LATE_START_S:
             yield file.in_clip(report.index, value=report.start_s, time_s=0.0)
         elif parameters.target == UNITY:

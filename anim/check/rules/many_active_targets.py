@@ -16,7 +16,7 @@ MIN_WEIGHT = 1e-6
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the largest number at a key."""
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         tracks = resolve_weight_pointers(file.skeleton, clip).tracks
         weights = [track.values for track in tracks if track.path == "weights"]
         most = max((int((np.abs(values) > MIN_WEIGHT).sum(axis=1).max()) for values in weights), default=0)

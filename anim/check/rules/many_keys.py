@@ -18,7 +18,7 @@ FPS = 60.0  # of a fixed track
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with their highest rate."""
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         rate = max(map(_rate, clip.time_axes), default=0.0)
         if rate > parameters["rate"]:
             yield file.in_clip(report.index, value=rate)

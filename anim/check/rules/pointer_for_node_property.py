@@ -15,7 +15,7 @@ from anim.gltf.validation.channel_targets import EXTENSION, channel_target
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such channels."""
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         channels = sum(track.pointer is not None and track.path != "pointer" for track in clip.tracks)
         if channels:
             yield file.in_clip(report.index, channels)

@@ -25,7 +25,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 def _interpolations(file: CheckedFile, player: Player) -> Iterator[Occurrence]:
     problems = {Interpolation.CUBICSPLINE: player.cubic, Interpolation.STEP: player.step}
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         for interpolation, problem in problems.items():
             if problem and any(track.interpolation is interpolation for track in clip.tracks):
                 yield file.in_clip(report.index, problem=problem)

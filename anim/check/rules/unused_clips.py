@@ -17,7 +17,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         return
     shown = _reachable(file, [root for scene in scenes for root in scene.get("nodes", ())])
     shown |= _joints(file, shown)
-    for report, clip in file.clips():
+    for report, clip in file.clips:
         targets = {track.node for track in clip.tracks}
         if targets and None not in targets and not targets & shown:
             yield file.in_clip(report.index)

@@ -48,7 +48,7 @@ class EncodedTrack(Track):
 
 def attach_codes(track: Track, codes: FilteredValues) -> EncodedTrack:
     """Return the track with codes of its values, which the writer stores in place of them."""
-    return EncodedTrack(**{each.name: getattr(track, each.name) for each in fields(Track)}, codes=codes)
+    return EncodedTrack(**{each.name: getattr(track, each.name) for each in fields(Track) if each.init}, codes=codes)
 
 
 def check_extension(extension: str) -> None:

@@ -21,7 +21,10 @@ FRACTIONS = (5120, 5121, 5122, 5123)  # component types allowed for normalized r
 
 
 class Reader:
-    """Reader of one document's tracks; tracks on one input accessor share one time axis."""
+    """Reader of one document's tracks.
+
+    Tracks on one input accessor share one time axis; equal channels, of many clips, share one track.
+    """
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
         self._nodes = json_array(document.json, "nodes")
@@ -29,6 +32,7 @@ class Reader:
         self._accessors = accessors
         self._time_axes: dict[int, TimeAxis] = {}
         self._values: dict[int, Floats] = {}
+        self._tracks: dict[tuple[object, ...], Track] = {}
 
     def track(self, animation: Json, number: int) -> Track | None:
         """Return a channel of `animation` as a track, None without a supported target."""
@@ -36,9 +40,13 @@ class Reader:
         found = channel_targets.channel_target(channel)
         if found is None:
             return None
+        sampler = animation["samplers"][channel["sampler"]]
+        key = (found, sampler["input"], sampler["output"], sampler.get("interpolation"))
+        if key in self._tracks:
+            return self._tracks[key]
         node, path, address = found
         try:
-            return self._track(animation["samplers"][channel["sampler"]], node, path, address)
+            return self._tracks.setdefault(key, self._track(sampler, node, path, address))
         except AnimError as error:
             if isinstance(error, RangeError | ShapeError):  # caused by the file, not by a caller
                 error = FormatError(error.problem, where=error.where, help=error.help)

@@ -233,7 +233,7 @@ def _clip(number: int, animation: Json, reader: animations.Reader) -> Clip:
     name = animation.get("name", "")
     try:
         tracks = [reader.track(animation, i) for i in range(len(animation["channels"]))]
-        return Clip(name, tuple(track for track in tracks if track is not None))
+        return Clip(name, tuple([track for track in tracks if track is not None]))
     except AnimError as error:
         if not error.where.startswith("clip"):
             error.at(clip_label(name, number))

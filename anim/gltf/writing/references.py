@@ -138,13 +138,8 @@ def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str
 
     This goes through all of a file's JSON, up to 100 000 objects: pointers are only written out where one is needed.
     """
-    if isinstance(value, list):
-        for i, item in enumerate(value):
-            if isinstance(item, _CONTAINERS):
-                _collect_unknown(item, (path, i), found)
-        return
-    for key, item in value.items():
-        if not isinstance(item, _CONTAINERS) or key == "extras":
+    for key, item in enumerate(value) if isinstance(value, list) else value.items():
+        if not isinstance(item, _CONTAINERS) or not item or key == "extras":
             continue
         if key == "extensions" and isinstance(item, dict):
             for name, extension in item.items():

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError, check_type
 from anim.gltf.document import Document, Json, copy_json, json_array
-from anim.gltf.meshopt.storage import check_extension
+from anim.gltf.meshopt.storage import EncodedTrack, FilteredValues, check_extension
 from anim.gltf.reading import reader
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import channel_targets
@@ -96,6 +96,7 @@ class _ContentPool:
         self.sources: list[set[int]] = []  # for each content, the accessors of the samplers that it replaces
         self._indices: dict[AccessorData, int] = {}
         self._time_axes: dict[TimeAxis, int] = {}
+        self._values: dict[tuple[bytes, FilteredValues | None], int] = {}
 
     def _add(self, content: AccessorData) -> int:
         index = self._indices.get(content)
@@ -108,8 +109,11 @@ class _ContentPool:
         return index
 
     def values(self, track: Track) -> int:
-        """The pending index of a track's values."""
-        return self._add(encoding.values(track))
+        """The pending index of a track's values; those of equal tracks are encoded once."""
+        key = track.digest, track.codes if isinstance(track, EncodedTrack) else None
+        if key not in self._values:
+            self._values[key] = self._add(encoding.values(track))
+        return self._values[key]
 
     def time_axis(self, track: Track) -> int:
         """The pending index of a track's times; those of a shared axis are encoded once."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anim.measure.equal_clips import first_equal, repeat_change, tracks_digest
+from anim.measure.equal_clips import first_equal, repeat_change, track_digests
 from anim.model import AccessorFormat, Clip, Track
 from tests.clips import CUBICSPLINE, STEP, clip, track
 
@@ -60,7 +60,7 @@ def test_keys_do_not_run_into_those_of_the_next_track() -> None:
     items = [
         (clip(*(track(f"/a/{i}", range(n), ones[:n]) for i, n in enumerate(size)), name=str(size)),) for size in sizes
     ]
-    assert tracks_digest(items[0][0]) != tracks_digest(items[1][0])
+    assert track_digests(items[0][0]) != track_digests(items[1][0])
 
 
 def test_a_change_is_repeated_under_the_own_name() -> None:
