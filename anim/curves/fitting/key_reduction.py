@@ -11,6 +11,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 
 UNBOUNDED = 1 << 30
+KEYS_PER_PART = 8192  # of longer tracks; their parts are searched at once, and a key stays between two of them
 
 SegmentTest: TypeAlias = Callable[[Ints, Ints, Ints], Bools]  # track, start, end key (B,) → True where within tolerance
 
@@ -19,17 +20,19 @@ def greedy_segments(tracks: int, count: int, fits: SegmentTest) -> Bools:
     """Return the keys (G, K) that remain of `count` keys of each track; the first and the last always do.
 
     fits: whether a segment between two keys replaces those between; asked for segments with a key between only.
-    From each key the farthest reachable one is searched by doubling and then halving the step, all tracks at once;
-    greedy choices of the longest segment give few keys, though not always the fewest.
+    From each key the farthest reachable one is searched by doubling and then halving the step, all tracks and all
+    their parts of KEYS_PER_PART keys at once; greedy choices of the longest segment give few keys, though not always
+    the fewest.
     """
     keep = np.zeros((tracks, count), np.bool_)
-    keep[:, 0] = keep[:, -1] = True
-    last = count - 1
+    ends = np.append(np.arange(KEYS_PER_PART, count - 1, KEYS_PER_PART), count - 1)  # of the parts
+    keep[:, 0] = True
+    keep[:, ends] = True
     if count <= 2 or not tracks:
         return keep
-    track = np.arange(tracks)
-    start = np.zeros(tracks, np.int64)
-    good, step, bad = start + 1, np.full(tracks, 2), np.full(tracks, UNBOUNDED)
+    track, last = np.repeat(np.arange(tracks), len(ends)), np.tile(ends, tracks)
+    start = np.tile(np.append(0, ends[:-1]), tracks)
+    good, step, bad = np.minimum(start + 1, last), np.full(len(track), 2), np.full(len(track), UNBOUNDED)
     while len(track):
         doubling = bad == UNBOUNDED
         end = np.where(doubling, np.minimum(good + step, last), (good + bad) // 2)
@@ -50,14 +53,18 @@ def greedy_segments(tracks: int, count: int, fits: SegmentTest) -> Bools:
         step = np.where(done, np.maximum(1, length - 1), step)
         bad = np.where(done, UNBOUNDED, bad)
         open_ = start < last
-        track, start, good, step, bad = track[open_], start[open_], good[open_], step[open_], bad[open_]
+        track, last, start = track[open_], last[open_], start[open_]
+        good, step, bad = good[open_], step[open_], bad[open_]
     return keep
 
 
 def greedy_indices(count: int, fits: Callable[[int, int], bool]) -> Ints:
     """Return the indices of the remaining keys of one track; fits: as for `greedy_segments`."""
-    keep = greedy_segments(1, count, lambda _, start, end: np.array([fits(int(start[0]), int(end[0]))]))
-    return np.flatnonzero(keep[0])
+
+    def each_fits(_: Ints, start: Ints, end: Ints) -> Bools:
+        return np.array([fits(*pair) for pair in zip(start.tolist(), end.tolist(), strict=True)])
+
+    return np.flatnonzero(greedy_segments(1, count, each_fits)[0])
 
 
 def greedy_keys(values: Floats, times: Floats) -> Bools:
@@ -74,8 +81,9 @@ def joint_greedy_keys(values: Floats, times: Floats) -> Bools:
     every = np.arange(len(values))
 
     def fits(_: Ints, start: Ints, end: Ints) -> Bools:
-        same = np.zeros_like(every)
-        return np.array([_is_straight(values, times, every, same + start, same + end).all()])
+        pairs = np.repeat(np.stack((start, end)), len(every), axis=1)
+        within = _is_straight(values, times, np.tile(every, len(start)), *pairs)
+        return np.asarray(within.reshape(len(start), len(every)).all(axis=1))
 
     return np.asarray(greedy_segments(1, values.shape[1], fits)[0])
 

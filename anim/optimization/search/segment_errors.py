@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anim.arrays import Bools, Floats, Ints
+from anim.curves.fitting.key_reduction import KEYS_PER_PART
 
 SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
+MAX_STACKED_VALUES = 8_000_000  # of a table, in one call
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
 
@@ -39,20 +42,39 @@ class SegmentErrors:
 
     def greedy_keys(self, tracks: Ints, budgets: Floats) -> Bools:
         """Return the keys (k, K) of the `tracks` (k,) so that no segment's error exceeds the budget (k,) in m."""
-        shares = self._errors[:, tracks] * (1 / budgets).astype(np.float32)[:, None]
-        span = shares.shape[2]
-        costs = np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
-        total = np.full((len(tracks), self._count), np.inf, np.float32)
-        total[:, 0] = 0
-        came = np.zeros((len(tracks), self._count), np.int64)
-        every = np.arange(len(tracks))
-        for end in range(1, self._count):
-            width = min(span, end)
-            totals = total[:, end - width : end][:, ::-1] + costs[end, :, :width]
-            best = totals.argmin(axis=1)
-            total[:, end] = totals[every, best]
-            came[:, end] = end - 1 - best
-        return _trace(came)
+        keep = np.ones((len(tracks), self._count), np.bool_)
+        parts = max(MAX_STACKED_VALUES // (len(tracks) * self._errors.shape[2] * KEYS_PER_PART), 1)
+        for start in range(1, self._count, parts * KEYS_PER_PART):
+            stacked = slice(start, start + parts * KEYS_PER_PART)
+            shares = self._errors[stacked, tracks] * (1 / budgets).astype(np.float32)[:, None]
+            costs = np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
+            keep[:, stacked] = _fewest_keys(costs)
+        return keep
+
+
+def _fewest_keys(costs: NDArray[np.float32]) -> Bools:
+    """Keys (k, n) after a first one on the paths of least cost to the last one, through those between two parts.
+
+    costs: (n, k, span) of the segments that end at each key; inf where none does. All parts are searched at once.
+    """
+    count, tracks, span = costs.shape
+    length = min(count, KEYS_PER_PART)
+    parts = -(-count // length)
+    missing = np.full((parts * length - count, tracks, span), np.inf, np.float32)
+    rows = np.concatenate((costs, missing)) if len(missing) else costs
+    rows = rows.reshape(parts, length, tracks, span).transpose(1, 2, 0, 3).reshape(length, tracks * parts, span)
+    total = np.full((tracks * parts, length + 1), np.inf, np.float32)
+    total[:, 0] = 0
+    came = np.zeros((tracks * parts, length + 1), np.int64)
+    every = np.arange(tracks * parts)
+    for end in range(1, length + 1):
+        width = min(span, end)
+        totals = total[:, end - width : end][:, ::-1] + rows[end - 1, :, :width]
+        best = totals.argmin(axis=1)
+        total[:, end] = totals[every, best]
+        came[:, end] = end - 1 - best
+    last = np.tile(np.append(np.full(parts - 1, length), count - (parts - 1) * length), tracks)
+    return _trace(came, last)[:, 1:].reshape(tracks, parts * length)[:, :count]
 
 
 def _span(times: Floats) -> int:
@@ -78,14 +100,14 @@ def _segment_error(values: Floats, times: Floats, length: int) -> Floats:
     return np.asarray(np.sqrt(largest))
 
 
-def _trace(came: Ints) -> Bools:
-    """Mask (k, K) of the keys on the optimal paths, traced back in `came` (k, K) from the last key."""
-    tracks, count = came.shape
-    keep = np.zeros((tracks, count), np.bool_)
-    at = np.full(tracks, count - 1)
-    every = np.arange(tracks)
-    keep[:, 0] = True
-    while at.any():
-        keep[every, at] = True
-        at = came[every, at]
+def _trace(came: Ints, last: Ints) -> Bools:
+    """Mask (R, K) of the keys on the optimal paths, traced back in `came` (R, K) from the keys `last` (R,)."""
+    keep = np.zeros(came.shape, np.bool_)
+    for row, at, kept in zip(came, last.tolist(), keep, strict=True):
+        before = row.tolist()
+        path = []
+        while at:
+            path.append(at)
+            at = before[at]
+        kept[path] = True
     return keep

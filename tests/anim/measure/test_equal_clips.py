@@ -67,3 +67,9 @@ def test_a_change_is_repeated_under_the_own_name() -> None:
     old, same, new = (clip(each, name=name) for each, name in ((TRACK, "a"), (replace(TRACK), "b"), (BENT, "a")))
     assert repeat_change(same, old, new) == replace(new, name="b")
     assert repeat_change(same, old, old) is same
+
+
+def test_signs_of_zeros_count() -> None:
+    """They are kept in files, so that equal tracks can stand for each other."""
+    other = replace(TRACK, values=-np.zeros((2, 3)))
+    assert first_equal(_clips(replace(TRACK, values=np.zeros((2, 3))), other)) == [0, 1]

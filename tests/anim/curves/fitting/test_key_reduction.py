@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anim.arrays import Bools, Floats, Ints
-from anim.curves.fitting.key_reduction import greedy_indices, greedy_keys, greedy_segments, joint_greedy_keys
+from anim.curves.fitting import key_reduction
+from anim.curves.fitting.key_reduction import (
+    greedy_indices,
+    greedy_keys,
+    greedy_segments,
+    joint_greedy_keys,
+)
 
 RNG = np.random.default_rng(5)
 
@@ -136,3 +144,26 @@ def test_tracks_do_not_influence_each_other() -> None:
 def test_one_and_two_keys_stay_as_indices() -> None:
     for count in (1, 2):
         assert greedy_indices(count, lambda start, end: False).tolist() == [*range(count)]
+
+
+def test_parts_of_long_tracks_are_searched_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many calls as for one part, and the keys of each part by itself."""
+    monkeypatch.setattr(key_reduction, "KEYS_PER_PART", 300)
+    count, calls = 1000, 0
+    ends = [0, 300, 600, 900, 999]
+    wanted = RNG.random((2, count)) < 0.1
+
+    def fits(track: Ints, start: Ints, end: Ints) -> Bools:
+        nonlocal calls
+        calls += 1
+        return np.array([not wanted[t, a + 1 : b].any() for t, a, b in zip(track, start, end, strict=True)])
+
+    keep = greedy_segments(2, count, fits)
+    assert calls < 300
+    assert keep[:, ends].all()
+    assert keep[wanted].all()
+    values, times = np.cumsum(RNG.normal(size=(2, count, 1)), axis=1), np.arange(float(count))
+    parts = [slice(start, end + 1) for start, end in pairwise(ends)]
+    for search in (greedy_keys, lambda *keys: joint_greedy_keys(*keys)[None]):
+        keep = search(values, times)
+        assert all((keep[:, part] == search(values[:, part], times[part])).all() for part in parts)

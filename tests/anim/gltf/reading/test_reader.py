@@ -13,6 +13,7 @@ from anim.gltf.reading import reader
 from anim.model import AccessorFormat, Interpolation, ValueKind
 from anim.sampling import rest_world
 from fixtures.broken.pieces import animated, buffered, text
+from tests import many
 from tests.anim.gltf.pieces import triangle
 from tests.clips import about
 from tests.files import opened, opened_fixture
@@ -223,3 +224,9 @@ def test_a_fault_is_named_by_clip_track_and_target() -> None:
     assert str(caught.value) == (
         "clip 'walk', track 0 (node 0 'hip', translation): times not increasing at key 1 (0.4 s after 0.5 s)"
     )
+
+
+def test_equal_channels_of_many_clips_share_one_track() -> None:
+    first, *others = (clip.tracks for clip in reader.clips(opened(many.clips_equal(3))))
+    assert all(tracks[0] is first[0] for tracks in others)
+    assert len({track.digest for clip in reader.clips(opened(many.channels(20))) for track in clip.tracks}) == 10

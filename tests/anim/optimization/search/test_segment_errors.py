@@ -86,6 +86,21 @@ def test_long_lines_have_a_key_now_and_then() -> None:
     assert len(at) == 2 + (299 - 1) // SPAN_RANGE[0]
 
 
+def test_parts_of_long_tracks_are_searched_by_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(segment_errors, "KEYS_PER_PART", 200)
+    count = 500
+    values, times = _random(4, count, tracks=2)
+    budgets = np.array([1.0, 3])
+    keep = SegmentErrors(values, times, 4.0).greedy_keys(np.arange(2), budgets)
+    monkeypatch.setattr(segment_errors, "MAX_STACKED_VALUES", 1)
+    assert (SegmentErrors(values, times, 4.0).greedy_keys(np.arange(2), budgets) == keep).all()
+    for start in range(0, count - 1, 200):
+        part = slice(start, start + 201)
+        alone = SegmentErrors(values[:, part], times[part], 4.0).greedy_keys(np.arange(2), budgets)
+        assert keep[:, part][:, [0, -1]].all()
+        assert (alone == keep[:, part]).all()
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_and_two_keys_stay(count: int) -> None:
     values, times = _random(1, count)
