@@ -74,14 +74,14 @@ def merge_intervals(times: Floats, *clips: Clip, longest: float = MAX_UNSPLIT_S)
     The first starts at the first of the times, the last ends at the last of them. times: increasing, with all keys that
     are between them. longest: s, intervals up to this duration are not split.
     """
-    axes = [axis.times for clip in clips for axis in clip.time_axes]
-    keys = unique_sorted(np.concatenate([times[:1], *axes, times[-1:]]))
-    keys = keys[(keys >= times[0]) & (keys <= times[-1])]
+    axes = dict.fromkeys(axis for clip in clips for axis in clip.time_axes)
+    within = [each.times[slice(*np.searchsorted(each.times, times[[0, -1]]))] for each in axes]
+    keys = unique_sorted(np.concatenate([times[:1], *within, times[-1:]]))
     lengths = np.diff(keys)
     if not len(lengths):
         return Intervals(keys)
-    within = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(lengths) - 1)
-    return Intervals(unique_sorted(np.concatenate((keys, times[lengths[within] > longest]))))
+    interval = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(lengths) - 1)
+    return Intervals(unique_sorted(np.concatenate((keys, times[lengths[interval] > longest]))))
 
 
 def interval_keys(keys: Floats, where: Intervals) -> IntervalKeys:

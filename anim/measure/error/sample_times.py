@@ -19,7 +19,7 @@ FPS = 120.0  # fps of the grid for motion between keys
 def key_and_mid_times(*clips: Clip) -> Floats:
     """Return every key time of the clips and the middle of every interval, in seconds, increasing."""
     keys = _key_times(clips)
-    return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)))
+    return np.sort(np.concatenate((keys, (keys[1:] + keys[:-1]) / 2)), kind="stable")
 
 
 def dense_times(*clips: Clip, fps: float = FPS) -> Floats:

@@ -60,9 +60,12 @@ def _median(values: Floats) -> float:
 
 
 def _regular(times: Floats, rates: Floats) -> Floats:
-    frames = (times - times[0])[None] * rates[:, None]
-    share: Floats = (np.abs(frames - np.rint(frames)) < GRID_TOLERANCE_FRAMES).mean(axis=1)
-    return share
+    """Fraction of the key times on the grid of each rate."""
+    return np.array([_share_on_grid((times - times[0]) * rate) for rate in rates])
+
+
+def _share_on_grid(frames: Floats) -> float:
+    return float((np.abs(frames - np.rint(frames)) < GRID_TOLERANCE_FRAMES).mean())
 
 
 def _round_rate(fps: float) -> float:
