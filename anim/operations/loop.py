@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from anim.errors import RangeError, check_number
 from anim.maths import hermite, quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
+from anim.operations.track_stack import TrackStack, change_tracks
 from anim.operations.trim import cut_spline
 from anim.sampling.derivatives import rates
 from anim.sampling.times import check_fps, distinct_float32, min_interval
@@ -73,8 +75,8 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, fram
     blend = min(blend, duration)
     if frame_rate is not None:
         check_fps(frame_rate)
-    closed = (_close(t, clip, blend, frame_rate) if i in chosen else t for i, t in enumerate(clip.tracks))
-    return Clip(clip.name, tuple(closed))
+    at_end = _Blend(clip.start, clip.end - blend, clip.end, blend, frame_rate)
+    return change_tracks(clip, chosen, lambda tracks: _close(tracks, at_end))
 
 
 def _append_key(track: Track, clip: Clip, end: float, *, travels: bool) -> Track:
@@ -101,41 +103,71 @@ def _continue_travel(track: Track, clip: Clip, end: float) -> Floats:
     return _extrapolate(track, track.values[-1], (before + after) / 2, end - clip.end)[None]
 
 
-def _close(track: Track, clip: Clip, blend: float, frame_rate: float | None) -> Track:
-    if len(track.times) == 1:
-        return track
-    ends = np.array([clip.start, clip.end])
-    first, last = sample(track, ends)
-    if track.interpolation is Interpolation.STEP:
-        return _close_step(track, clip.end, first)
-    if len(track.times) > 2 and track.times[-2] > clip.end - min_interval(clip.end, MIN_INTERVAL_S):
-        track = _without_last_jump(track)
-        last = track.values[-1]
-    gap = _closing_offset(track, first, last)
-    speed = rates(track, ends[:1], before=False)[0]
-    change = speed - rates(track, ends[1:], before=True)[0]
-    if not gap.any() and not change.any():
-        return track
-    times = _times(track, clip.end - blend, clip.end, frame_rate)
-    if track.in_tangents is not None:
-        return _correct_spline(track, times, _Correction(clip.end - blend, clip.end, gap, change))
+class _Blend(NamedTuple):
+    """The part of a clip that is corrected: times of the clip's first key, of its own start and end, in s.
+
+    seconds: its duration. frame_rate: of added keys.
+    """
+
+    first: float
+    start: float
+    end: float
+    seconds: float
+    frame_rate: float | None
+
+
+def _close(tracks: TrackStack, blend: _Blend) -> Sequence[Track]:
+    if len(tracks.times) == 1:
+        return tracks.tracks
+    ends = np.array([blend.first, blend.end])
+    first, last = sample(tracks, ends)
+    if tracks.interpolation is Interpolation.STEP:
+        return _close_steps(tracks, blend.end, first)
+    found: list[Track] = list(tracks.tracks)
+    if len(tracks.times) > 2 and tracks.times[-2] > blend.end - min_interval(blend.end, MIN_INTERVAL_S):
+        tracks = _without_last_jump(tracks)
+        found, last = tracks.split(), tracks.values[-1]
+    gap = _closing_offset(tracks, first, last)
+    speed = rates(tracks, ends[:1], before=False)[0]
+    change = speed - rates(tracks, ends[1:], before=True)[0]
+    is_open = gap.any(axis=-1) | change.any(axis=-1)
+    if is_open.any():
+        closed = _correct(
+            tracks.pick(is_open), blend, first[is_open], speed[is_open], gap=gap[is_open], change=change[is_open]
+        )
+        for i, track in zip(np.flatnonzero(is_open).tolist(), closed, strict=True):
+            found[i] = track
+    return found
+
+
+def _correct(
+    tracks: TrackStack, blend: _Blend, first: Floats, speed: Floats, *, gap: Floats, change: Floats
+) -> list[Track]:
+    """The tracks, of which a clip starts with values `first` and `speed` (G, C), without the gaps at its end."""
+    times = _times(tracks, blend.start, blend.end, blend.frame_rate)
+    if tracks.in_tangents is not None:
+        return _correct_spline(tracks, times, _Correction(blend.start, blend.end, gap, change))
     last_piece = float(times[-1] - times[-2])
-    before_last = _closing_offset(track, _extrapolate(track, first, speed, -last_piece), sample(track, times[-2:-1])[0])
-    slope = _end_slope(gap, before_last, blend, last_piece)
-    return _correct_linear(track, times, _Correction(clip.end - blend, clip.end, gap, slope))
+    before_last = _closing_offset(
+        tracks, _extrapolate(tracks, first, speed, -last_piece), sample(tracks, times[-2:-1])[0]
+    )
+    slope = _end_slope(gap, before_last, blend.seconds, last_piece)
+    return _correct_linear(tracks, times, _Correction(blend.start, blend.end, gap, slope))
 
 
-def _close_step(track: Track, end: float, first: Floats) -> Track:
-    """Return a STEP track with its first value at the end of the clip, which may be after its last key."""
-    if track.times[-1] > end - min_interval(end, MIN_INTERVAL_S):
-        return replace(track, values=np.concatenate((track.values[:-1], first[None])))
-    if (track.values[-1] == first).all():
-        return track
-    return track.with_keys(np.append(track.times, end), np.concatenate((track.values, first[None])))
+def _close_steps(tracks: TrackStack, end: float, first: Floats) -> list[Track]:
+    """STEP tracks with their first value (G, C) at the end of the clip, which may be after their last key."""
+    if tracks.times[-1] > end - min_interval(end, MIN_INTERVAL_S):
+        values = np.concatenate((tracks.values[:-1], first[None]))
+        return tracks.with_keys(tracks.time_axis, values).split()
+    values = np.concatenate((tracks.values, first[None]))
+    closed = tracks.with_keys(np.append(tracks.times, end), values).split()
+    same = (tracks.values[-1] == first).all(axis=-1).tolist()
+    return [old if is_same else new for old, new, is_same in zip(tracks.tracks, closed, same, strict=True)]
 
 
-def _without_last_jump(track: Track) -> Track:
-    """Return a track without a jump between its last two keys, which the correction replaces."""
+def _without_last_jump(track: TrackStack) -> TrackStack:
+    """Return tracks without a jump between their last two keys, which the correction replaces."""
     before, after = track.in_tangents, track.out_tangents
     times, values = np.append(track.times[:-2], track.times[-1]), track.values[:-1]
     if before is None or after is None:
@@ -143,13 +175,13 @@ def _without_last_jump(track: Track) -> Track:
     return track.with_keys(times, values, before[:-1], after[:-1])
 
 
-def _closing_offset(track: Track, first: Floats, last: Floats) -> Floats:
+def _closing_offset(track: TrackStack, first: Floats, last: Floats) -> Floats:
     if track.kind is ValueKind.ROTATION:
         return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(last), first))
     return first - last
 
 
-def _extrapolate(track: Track, value: Floats, speed: Floats, seconds: float) -> Floats:
+def _extrapolate(track: Track | TrackStack, value: Floats, speed: Floats, seconds: float) -> Floats:
     """Return the value some seconds after `value` at constant speed."""
     if track.kind is ValueKind.ROTATION:
         return quaternion.multiply(value, quaternion.from_rotation_vector(seconds * speed))
@@ -167,7 +199,7 @@ def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -
 
 
 class _Correction:
-    """Correction from `start` to `end`: 0 with speed 0 at first, `gap` with `speed` (per second) at last."""
+    """Correction from `start` to `end`: 0 with speed 0 at first, `gap` (G, C) with `speed` (per second) at last."""
 
     def __init__(self, start: float, end: float, gap: Floats, speed: Floats) -> None:
         self.start, self.end = start, end
@@ -182,18 +214,18 @@ class _Correction:
         return np.where(self._inside(times), slopes, 0.0)
 
     def _share(self, times: Floats) -> Floats:
-        return np.clip((times - self.start) / self._duration, 0.0, 1.0)[:, None]
+        return np.clip((times - self.start) / self._duration, 0.0, 1.0)[:, None, None]
 
     def _inside(self, times: Floats) -> Bools:
-        return (times > self.start)[:, None]
+        return (times > self.start)[:, None, None]
 
 
-def _correct_linear(track: Track, times: Floats, correction: _Correction) -> Track:
+def _correct_linear(track: TrackStack, times: Floats, correction: _Correction) -> list[Track]:
     values = _add_correction(track, sample(track, times), correction.value(times))
-    return track.with_keys(times, values)
+    return track.with_keys(times, values).split()
 
 
-def _times(track: Track, start: float, end: float, frame_rate: float | None) -> Floats:
+def _times(track: TrackStack, start: float, end: float, frame_rate: float | None) -> Floats:
     """Return the track's key times with the ends of the blend and, for sparse keys, some between."""
     keys = track.times
     inside = keys[(keys > start) & (keys < end)]
@@ -213,24 +245,27 @@ def _added_times(start: float, end: float, frame_rate: float | None) -> Floats:
     return np.append(frames[frames < end - 0.5 / frame_rate], end)
 
 
-def _add_correction(track: Track, values: Floats, added: Floats) -> Floats:
+def _add_correction(track: TrackStack, values: Floats, added: Floats) -> Floats:
     if track.kind is not ValueKind.ROTATION:
         return values + added
     return quaternion.align_signs(quaternion.multiply(values, quaternion.from_rotation_vector(added)))
 
 
-def _correct_spline(track: Track, times: Floats, correction: _Correction) -> Track:
+def _correct_spline(track: TrackStack, times: Floats, correction: _Correction) -> list[Track]:
     before = rates(track, times, before=True) + correction.slope(times)
     after = rates(track, times, before=False) + correction.slope(times)
     values = _add_correction(track, sample(track, times), correction.value(times))
     if track.kind is ValueKind.ROTATION:
         before, after = quaternion.derivative(values, before), quaternion.derivative(values, after)
     before[0], after[-1] = 0.0, 0.0
-    corrected = track.with_keys(times, values, before, after)
+    corrected = track.with_keys(times, values, before, after).split()
     cut = int(np.abs(times - correction.start).argmin())
     if track.kind is not ValueKind.ROTATION or cut == 0:
         return corrected
-    return _join_splines(cut_spline(track, float(times[0]), float(times[cut])), corrected, cut)
+    return [
+        _join_splines(cut_spline(old, float(times[0]), float(times[cut])), new, cut)
+        for old, new in zip(track.split(), corrected, strict=True)
+    ]
 
 
 def _join_splines(first: Track, second: Track, index: int) -> Track:

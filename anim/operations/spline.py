@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,7 +21,9 @@ from anim.errors import AnimError, RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
+from anim.operations.track_stack import TrackStack, change_tracks
 
+Keyed = TypeVar("Keyed", Track, TrackStack)
 MIN_VECTOR_RANGE = 1e-3  # lower limit of a vector track's largest value, for the comparison of its ends
 END_TOLERANCE_FRACTION = 1e-6  # of the clip's end: differences of float32 times by rounding
 
@@ -47,18 +51,30 @@ def spline(
     """
     chosen = track_indices(clip, tracks)
     rule = parse(tangents) if isinstance(tangents, str) else tangents
-    new = list(clip.tracks)
-    for i in sorted(chosen):
-        track = new[i]
+    is_loop = cyclic or rule.loop
+
+    def apply(tracks: TrackStack) -> Sequence[Track]:
+        if not _takes_tangents(tracks):
+            return tracks.tracks
+        if not (rule.smooth or rule.by_path):
+            with suppress(AnimError):  # of one of the tracks, which is named below
+                return checked(_apply_rule(_span(tracks, clip) if is_loop else tracks, rule, cyclic=cyclic).split())
+        return [alone(track) for track in tracks.tracks]
+
+    def alone(track: Track) -> Track:
         try:
-            new[i] = _apply_rule(_span(track, clip) if cyclic or rule.loop else track, rule, cyclic=cyclic)
-            travels = track.node == root and track.path == "translation"
-            if (cyclic or rule.loop) and new[i] is not track and not travels:
-                _check_closed(track)
+            return checked([_apply_rule(_span(track, clip) if is_loop else track, rule, cyclic=cyclic)])[0]
         except AnimError as error:
             target = track.pointer if track.node is None else f"{label(track.node)}, {track.path}"
             raise error.at(f"track of {target}", ": ") from None
-    return Clip(clip.name, tuple(new))
+
+    def checked(found: list[Track]) -> list[Track]:
+        for track in found if is_loop else ():
+            if track.node != root or track.path != "translation":
+                _check_closed(track)
+        return found
+
+    return change_tracks(clip, chosen, apply)
 
 
 def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
@@ -66,22 +82,21 @@ def max_key_change(before: Clip, after: Clip) -> tuple[float, float]:
 
     Both clips have the same tracks with the same keys.
     """
-    moved, turned = 0.0, 0.0
-    for old, new in zip(before.tracks, after.tracks, strict=True):
-        if old is new or old.values.shape != new.values.shape:
-            continue
-        if old.kind is ValueKind.ROTATION:
-            a, b = quaternion.normalize(old.values), quaternion.normalize(new.values)
-            turned = max(turned, float(quaternion.angle_between(a, b).max()))
-        else:
-            moved = max(moved, float(abs(old.values - new.values).max()))
-    return moved, turned
+    pairs = [
+        (old, new)
+        for old, new in zip(before.tracks, after.tracks, strict=True)
+        if old is not new and old.values.shape == new.values.shape
+    ]
+    turns = [pair for pair in pairs if pair[0].kind is ValueKind.ROTATION]
+    moves = [float(abs(old.values - new.values).max()) for old, new in pairs if old.kind is not ValueKind.ROTATION]
+    if not turns:
+        return max(moves, default=0.0), 0.0
+    a, b = (quaternion.normalize(np.concatenate([track.values for track in side])) for side in zip(*turns, strict=True))
+    return max(moves, default=0.0), float(quaternion.angle_between(a, b).max())
 
 
-def _span(track: Track, clip: Clip) -> Track:
-    """Return a track with keys at both ends of its clip, within the resolution of float32 times."""
-    if not _takes_tangents(track):
-        return track
+def _span(track: Keyed, clip: Clip) -> Keyed:
+    """Return tracks with keys at both ends of their clip, within the resolution of float32 times."""
     near = END_TOLERANCE_FRACTION * max(clip.end, 1.0)
     keys = np.arange(len(track.times))
     start, end = int(track.times[0] > clip.start + near), int(track.times[-1] < clip.end - near)
@@ -92,7 +107,7 @@ def _span(track: Track, clip: Clip) -> Track:
     return track.with_keys(times, track.values[keys], interpolation=Interpolation.LINEAR)  # tangents follow
 
 
-def _takes_tangents(track: Track) -> bool:
+def _takes_tangents(track: TrackStack) -> bool:
     is_step = track.interpolation is Interpolation.STEP or track.kind is ValueKind.DISCRETE
     return not is_step and len(track.times) > 1
 
@@ -107,9 +122,7 @@ def _check_closed(track: Track) -> None:
         raise RangeError(f"the loop is open: its last value is {gap:.3g} from its first (expected the same value)")
 
 
-def _apply_rule(track: Track, rule: TangentRule, *, cyclic: bool) -> Track:
-    if not _takes_tangents(track):
-        return track
+def _apply_rule(track: Keyed, rule: TangentRule, *, cyclic: bool) -> Keyed:
     make = apply_rotation_tangents if track.kind is ValueKind.ROTATION else apply_tangents
     keys = make(track.times, track.values, rule, cyclic=cyclic)
     spline = Interpolation.CUBICSPLINE

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,9 +15,11 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.retime import shift_time
 from anim.operations.selection import track_indices
+from anim.operations.track_stack import TrackStack, change_tracks
 from anim.sampling.derivatives import rates
-from anim.sampling.track import sample
+from anim.sampling.track import Keys, sample
 
+Spline = TypeVar("Spline", Track, TrackStack)
 ANGLE_TOLERANCE_RAD = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
 
 
@@ -54,7 +58,7 @@ def _trim_clip(clip: Clip, start: float | None, end: float | None, chosen: froze
     last = clip.end if end is None else min(float(np.float32(end)), clip.end)
     if not last > first:
         raise RangeError(_nothing_left(clip, start, end))
-    new = [_trim_track(track, first, last) if i in chosen else track for i, track in enumerate(clip.tracks)]
+    new = list(change_tracks(clip, chosen, lambda tracks: _trim_tracks(tracks, first, last)).tracks)
     if chosen and all(track.times[-1] < last for track in new):
         new[min(chosen)] = _constant_keys(new[min(chosen)], first, last)
     return Clip(clip.name, tuple(new))
@@ -68,30 +72,47 @@ def _nothing_left(clip: Clip, start: float | None, end: float | None) -> str:
     return f"end {end or 0.0:g} s must be after start {start or 0.0:g} s"
 
 
-def _trim_track(track: Track, start: float, end: float) -> Track:
-    inner = (track.times > start) & (track.times < end)
-    if len(track.times) == 1 or not (inner.any() or _changes(track, start, end)):
-        return _single_key(track, start)
-    if track.interpolation is Interpolation.CUBICSPLINE:
-        return cut_spline(track, start, end)
-    times = np.concatenate(([start], track.times[inner], [end]))
-    values = np.concatenate((sample(track, times[:1]), track.values[inner], sample(track, times[-1:])))
-    if track.kind is ValueKind.ROTATION:
+def _trim_tracks(tracks: TrackStack, start: float, end: float) -> Sequence[Track]:
+    inner = (tracks.times > start) & (tracks.times < end)
+    if len(tracks.times) == 1:
+        return _single_key(tracks, start).split()
+    if inner.any():
+        return _cut(tracks, start, end)
+    found = _single_key(tracks, start).split()
+    changing = _changes(tracks, start, end)
+    if not changing.any():
+        return found
+    for i, track in zip(np.flatnonzero(changing).tolist(), _cut(tracks.pick(changing), start, end), strict=True):
+        found[i] = track
+    return found
+
+
+def _cut(tracks: TrackStack, start: float, end: float) -> Sequence[Track]:
+    if tracks.interpolation is Interpolation.CUBICSPLINE:
+        if tracks.kind is ValueKind.ROTATION:  # with added keys of its own each
+            return [cut_spline(track, start, end) for track in tracks.split()]
+        return cut_spline(tracks, start, end).split()
+    inner = (tracks.times > start) & (tracks.times < end)
+    times = np.concatenate(([start], tracks.times[inner], [end]))
+    values = np.concatenate((sample(tracks, times[:1]), tracks.values[inner], sample(tracks, times[-1:])))
+    if tracks.kind is ValueKind.ROTATION:
         values *= _cut_signs(values, np.concatenate(([False], np.ones(inner.sum(), bool), [False])))
-    return track.with_keys(times, values)
+    return tracks.with_keys(times, values).split()
 
 
-def _changes(track: Track, start: float, end: float) -> bool:
-    """Return whether a track without a key in between has different end values or a non-zero speed there."""
-    ends = sample(track, np.array([start, end]))
-    moving = track.interpolation is not Interpolation.STEP and bool(rates(track, np.array([start]), before=False).any())
-    return moving or bool((ends[0] != ends[1]).any())
+def _changes(tracks: TrackStack, start: float, end: float) -> Bools:
+    """Mask (G,) of tracks without a key in between that have different end values or a non-zero speed there."""
+    ends = sample(tracks, np.array([start, end]))
+    found: Bools = (ends[0] != ends[1]).any(axis=-1)
+    if tracks.interpolation is not Interpolation.STEP:
+        found |= rates(tracks, np.array([start]), before=False)[0].any(axis=-1)
+    return found
 
 
-def _single_key(track: Track, start: float) -> Track:
-    values = sample(track, np.array([start]))
-    linear = Interpolation.LINEAR if track.interpolation is Interpolation.CUBICSPLINE else track.interpolation
-    return track.with_keys([start], values, interpolation=linear)
+def _single_key(tracks: TrackStack, start: float) -> TrackStack:
+    values = sample(tracks, np.array([start]))
+    linear = Interpolation.LINEAR if tracks.interpolation is Interpolation.CUBICSPLINE else tracks.interpolation
+    return tracks.with_keys([start], values, interpolation=linear)
 
 
 def _constant_keys(track: Track, start: float, end: float) -> Track:
@@ -99,11 +120,14 @@ def _constant_keys(track: Track, start: float, end: float) -> Track:
     return track.with_keys([start, end], np.repeat(track.values, 2, axis=0))
 
 
-def cut_spline(track: Track, start: float, end: float) -> Track:
-    """Return the part of a CUBICSPLINE track from `start` to `end`: keys between unchanged, ends exact."""
+def cut_spline(track: Spline, start: float, end: float) -> Spline:
+    """Return the part of a CUBICSPLINE track from `start` to `end`: keys between unchanged, ends exact.
+
+    Or that of several tracks, but for rotations.
+    """
     inner = (track.times > start) & (track.times < end)
     times = np.concatenate(([start], track.times[inner], [end]))
-    if track.kind is ValueKind.ROTATION:
+    if isinstance(track, Track) and track.kind is ValueKind.ROTATION:
         times = _insert_cut_times(track, times)
     values = sample(track, times)
     before, after = rates(track, times, before=True), rates(track, times, before=False)
@@ -130,7 +154,7 @@ def _insert_cut_times(track: Track, times: Floats) -> Floats:
 
 
 def _cut_signs(values: Floats, exact: Bools) -> Floats:
-    """Signs (K, 1) of quaternion keys for which those of cut segments continue their neighbors.
+    """Signs (K, ..., 1) of quaternion keys for which those of cut segments continue their neighbors.
 
     Original keys (`exact`) keep theirs: a spline between q and −q takes the long arc, and would change with its signs.
     """
@@ -141,10 +165,10 @@ def _cut_signs(values: Floats, exact: Bools) -> Floats:
         signs[:first] *= signs[first]
         signs[last + 1 :] *= signs[last]
         signs[first : last + 1] = 1.0
-    return signs[:, None]
+    return signs[..., None]
 
 
-def _restore_tangents(track: Track, times: Floats, exact: Bools, before: Floats, after: Floats) -> None:
+def _restore_tangents(track: Keys, times: Floats, exact: Bools, before: Floats, after: Floats) -> None:
     """Restore the tangents of original keys bit for bit, except on the side of a cut."""
     assert track.in_tangents is not None
     assert track.out_tangents is not None

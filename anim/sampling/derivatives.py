@@ -8,6 +8,7 @@ from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import segment
+from anim.sampling.track import Keys
 
 
 def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -21,13 +22,14 @@ def tangents(track: Track, times: Floats, values: Floats) -> tuple[Floats, Float
     return before, after
 
 
-def rates(track: Track, times: Floats, *, before: bool) -> Floats:
-    """Return the derivative just before, or just after, each time: (F, C) per second.
+def rates(track: Keys, times: Floats, *, before: bool) -> Floats:
+    """Return the derivative just before, or just after, each time: (F, C) per second, of several tracks (F, G, C).
 
     Of rotations the angular velocity (F, 3) in rad/s about the node's own axes. STEP has rate 0, and so has every track
     outside its keys.
     """
-    result = np.zeros((len(times), 3 if track.kind is ValueKind.ROTATION else track.values.shape[1]))
+    *tracks, width = track.values.shape[1:]
+    result = np.zeros((len(times), *tracks, 3 if track.kind is ValueKind.ROTATION else width))
     if track.interpolation is Interpolation.STEP or len(track.times) == 1:
         return result
     keys = track.times
@@ -36,5 +38,5 @@ def rates(track: Track, times: Floats, *, before: bool) -> Floats:
     left = index[inside]
     duration = keys[left + 1] - keys[left]
     u = (times[inside] - keys[left]) / duration
-    result[inside] = segment.derivative(track, left, u) / duration[:, None]
+    result[inside] = segment.derivative(track, left, u) / segment.column(duration, track)
     return result

@@ -7,6 +7,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track, ValueKind
+from anim.sampling.track import Keys
 
 
 def evaluate(track: Track, left: Ints, share: Floats) -> Floats:
@@ -26,23 +27,32 @@ def evaluate(track: Track, left: Ints, share: Floats) -> Floats:
     return quaternion.normalize(result) if track.kind is ValueKind.ROTATION else result
 
 
-def derivative(track: Track, left: Ints, share: Floats) -> Floats:
-    """Return the derivative per u (F, C); of rotations the angular velocity (F, 3) rad about own axes."""
+def derivative(track: Keys, left: Ints, share: Floats) -> Floats:
+    """Return the derivative per u (F, C), of several tracks (F, G, C).
+
+    Of rotations the angular velocity (F, 3), (F, G, 3) in rad about own axes.
+    """
     rotation = track.kind is ValueKind.ROTATION
     if track.interpolation is Interpolation.STEP:
-        return np.zeros((len(left), 3 if rotation else track.values.shape[1]))
+        return np.zeros((len(left), *track.values.shape[1:-1], 3 if rotation else track.values.shape[-1]))
     if track.interpolation is Interpolation.CUBICSPLINE:
-        slope = hermite.first_derivative(share[:, None], *_cubic(track, left))
+        u = column(share, track)
+        slope = hermite.first_derivative(u, *_cubic(track, left))
         if not rotation:
             return slope
-        raw = hermite.evaluate(share[:, None], *_cubic(track, left))
+        raw = hermite.evaluate(u, *_cubic(track, left))
         # q / |q| rotates with ω = 2 vec(q* q′) / |q|²: the component of q′ along q only changes the length
-        turned = quaternion.multiply(quaternion.conjugate(raw), slope)[:, :3]
-        return np.asarray(2 * turned / quaternion.dot(raw, raw)[:, None])
+        turned = quaternion.multiply(quaternion.conjugate(raw), slope)[..., :3]
+        return np.asarray(2 * turned / quaternion.dot(raw, raw)[..., None])
     start, end = track.values[left], track.values[left + 1]
     if rotation:
         return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(start), end))
     return np.asarray(end - start)
+
+
+def column(numbers: Floats, track: Keys) -> Floats:
+    """Return numbers (F,), one per time, as (F, 1) or (F, 1, 1), to multiply values of a track or of several."""
+    return numbers.reshape(-1, *[1] * (track.values.ndim - 1))
 
 
 def max_rate(track: Track, pieces: Ints) -> float:
@@ -63,10 +73,10 @@ def max_rate_per_second(track: Track) -> float:
 _FRACTIONS = np.linspace(0, 1, 9)
 
 
-def _cubic(track: Track, left: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+def _cubic(track: Keys, left: Ints) -> tuple[Floats, Floats, Floats, Floats]:
     assert track.in_tangents is not None
     assert track.out_tangents is not None
-    duration = (track.times[left + 1] - track.times[left])[:, None]
+    duration = column(track.times[left + 1] - track.times[left], track)
     return (
         track.values[left],
         duration * track.out_tangents[left],

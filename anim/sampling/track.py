@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
 from anim.maths import hermite, quaternion
-from anim.model import Interpolation, Track, ValueKind
+from anim.model import Interpolation, ValueKind
 
 MIN_QUATERNION_COMPONENT = 1e-9  # a quaternion whose largest component is below this has no direction
+
+
+class Keys(Protocol):
+    """Keys of a track, or of G tracks of one kind on one time axis.
+
+    times: (K,) s. values, tangents: (K, C), or (K, G, C).
+    """
+
+    @property
+    def interpolation(self) -> Interpolation: ...
+    @property
+    def kind(self) -> ValueKind: ...
+    @property
+    def times(self) -> Floats: ...
+    @property
+    def values(self) -> Floats: ...
+    @property
+    def in_tangents(self) -> Floats | None: ...
+    @property
+    def out_tangents(self) -> Floats | None: ...
 
 
 class KeyInterval(NamedTuple):
@@ -39,8 +59,8 @@ def find_interval(times: Floats, at: Floats) -> KeyInterval:
     return KeyInterval(left, right, u, duration)
 
 
-def sample(track: Track, at: Floats) -> Floats:
-    """Return the values (F, C) of a track at times `at` (F,) in seconds.
+def sample(track: Keys, at: Floats) -> Floats:
+    """Return the values (F, C) of a track, or (F, G, C) of several, at times `at` (F,) in seconds.
 
     At a key the key's own value; outside the keys the first or the last one; rotations are unit quaternions.
     Raises ShapeError or RangeError for invalid times.

@@ -57,3 +57,22 @@ def test_tracks_are_sorted_once_for_all_steps_of_a_proof(
     (tmp_path / "in.glb").write_bytes(many.side_moving(2000))
     call("resample", tmp_path / "in.glb", tmp_path / "out.glb", "--fps", "60").product()
     assert len(counted) == 1 < len(steps)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ["loop", "IN", "OUT", "--blend", "0.1"],
+        ["trim", "IN", "OUT", "--from", "0.1", "--to", "0.7"],
+        ["trim", "IN", "OUT", "--from", "0.1", "--to", "0.2"],
+        ["spline", "IN", "OUT"],
+    ],
+)
+def test_tracks_of_one_time_axis_are_changed_together(
+    line: list[str], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.side_moving(NODES))
+    counted = [*(count_calls(monkeypatch, quaternion, name) for name in ("slerp", "multiply", "normalize"))]
+    call(*({"IN": tmp_path / "in.glb", "OUT": tmp_path / "out.glb"}.get(each, each) for each in line)).product()
+    assert all(len(each) < MAX_CALLS for each in counted)
+    assert any(counted)

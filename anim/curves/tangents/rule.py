@@ -37,6 +37,7 @@ class TangentRule:
     smooth: whether the result is C2. Such rules treat rotations by component, since C2 components stay C2 when the
     player normalizes the quaternion. The others treat rotations by angular velocity.
     loop: whether it treats every track as a loop.
+    by_path: whether slopes of a component depend on the others, as by distances between keys, or scipy's threshold.
     """
 
     name: str
@@ -44,9 +45,10 @@ class TangentRule:
     cyclic: Rule
     smooth: bool = False
     loop: bool = False
+    by_path: bool = False
 
 
-def local_rule(name: str, slopes: Slopes) -> TangentRule:
+def local_rule(name: str, slopes: Slopes, *, by_path: bool = False) -> TangentRule:
     """Return a rule of at most two neighbors on each side; in a loop those of the other end."""
 
     def open_keys(times: Floats, values: Floats) -> SplineKeys:
@@ -56,7 +58,7 @@ def local_rule(name: str, slopes: Slopes) -> TangentRule:
         before, after = slopes(*extend_loop(times, values, 2))
         return SplineKeys(values, before[2:-2], after[2:-2])
 
-    return TangentRule(name, open_keys, cyclic_keys)
+    return TangentRule(name, open_keys, cyclic_keys, by_path=by_path)
 
 
 def extend_loop(times: Floats, values: Floats, count: int) -> tuple[Floats, Floats]:

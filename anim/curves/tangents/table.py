@@ -21,9 +21,9 @@ TANGENTS: dict[str, TangentRule] = {
     for rule in (
         local_rule("time-aware", local.bessel),
         local_rule("catmull-rom", local.catmull_rom),
-        local_rule("centripetal", local.centripetal),
+        local_rule("centripetal", local.centripetal, by_path=True),
         local_rule("monotone", local.monotone),
-        local_rule("akima", local.akima),
+        local_rule("akima", local.akima, by_path=True),
         local_rule("flat", local.flat),
         TangentRule("natural", smooth.natural, smooth.periodic, smooth=True),
         TangentRule("clamped", smooth.clamped, smooth.clamped, smooth=True),
@@ -52,13 +52,14 @@ def parse(text: str) -> TangentRule:
 def apply_tangents(times: ArrayLike, values: ArrayLike, rule: TangentRule, *, cyclic: bool = False) -> SplineKeys:
     """Return CUBICSPLINE keys for times (K,) s: values (K, C) and the rule's tangents per second.
 
+    values: (K, C), or those of G tracks (K, G, C) for a rule that is neither smooth nor by path.
     cyclic: the last key is the first one of the next cycle, so speed is continuous there (for C2 rules acceleration
     too: natural becomes periodic). The difference of last and first value is the displacement per cycle.
     The unused tangents, before the first and after the last key, are 0; so are all of a single key.
     Raises RangeError or ShapeError for arrays that are not valid keys.
     keys 0, 1, 2 s with 0, 1, 0 by time-aware → out-tangents 2, 0, (0), in-tangents (0), 0, −2
     """
-    t, v = _check_keys(times, arrays.as_floats(values, "K C", name="values"))
+    t, v = _check_keys(times, arrays.as_floats(values, _shape(values, "C"), name="values"))
     return _clear_end_tangents(_keys(t, v, rule, cyclic))
 
 
@@ -70,15 +71,16 @@ def apply_rotation_tangents(
     Local rules work on the rotations from key to key, unrolled into a curve of rotation vectors in body axes: its
     slopes are angular velocities ω, and the tangents ½ q ⊗ ω. C2 rules work on the components, which stay C2 when the
     player normalizes them; through bspline's values, which are normalized here, a second C2 curve is solved. Best below
-    120° between keys. cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
+    120° between keys. rotations: or those of G tracks (K, G, 4), as in apply_tangents.
+    cyclic: as in apply_tangents; for C2 rules the last key must be the first one, or its negative.
     Raises RangeError for an open loop under a C2 rule, or a quaternion of length 0.
     """
-    t, checked = _check_keys(times, arrays.as_floats(rotations, "K 4", name="rotations"))
+    t, checked = _check_keys(times, arrays.as_floats(rotations, _shape(rotations, "4"), name="rotations"))
     q = quat.align_signs(quat.normalize(checked))
     if rule.smooth:
         return _clear_end_tangents(_component_keys(t, q, rule, rule.loop or (cyclic and rule.cyclic is not rule.open)))
     turns = quat.rotation_vector(quat.multiply(quat.conjugate(q[:-1]), q[1:]))
-    rolled_out = np.concatenate((np.zeros((1, 3)), np.cumsum(turns, axis=0)))
+    rolled_out = np.concatenate((np.zeros((1, *turns.shape[1:])), np.cumsum(turns, axis=0)))
     rates = _keys(t, rolled_out, rule, cyclic)
     return _clear_end_tangents(
         SplineKeys(q, quat.derivative(q, rates.in_tangents), quat.derivative(q, rates.out_tangents), rates.departure)
@@ -94,6 +96,10 @@ def check_closed(rotations: Floats) -> None:
         )
 
 
+def _shape(values: ArrayLike, components: str) -> str:
+    return f"K G {components}" if np.ndim(values) == 3 else f"K {components}"
+
+
 def _check_keys(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
     t = arrays.as_key_times(times)
     if len(t) != len(values):
@@ -104,7 +110,10 @@ def _check_keys(times: ArrayLike, values: Floats) -> tuple[Floats, Floats]:
 def _keys(times: Floats, values: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
     if len(times) == 1:
         return SplineKeys(values, np.zeros_like(values), np.zeros_like(values))
-    return (rule.cyclic if cyclic else rule.open)(times, values)
+    keys = (rule.cyclic if cyclic else rule.open)(times, values.reshape(len(values), -1))
+    shape = values.shape
+    before, after = keys.in_tangents.reshape(shape), keys.out_tangents.reshape(shape)
+    return SplineKeys(keys.values.reshape(shape), before, after, keys.departure)
 
 
 def _component_keys(times: Floats, q: Floats, rule: TangentRule, cyclic: bool) -> SplineKeys:
