@@ -22,6 +22,7 @@ from cli.signals import install_handlers
 from cli.typer_options import Command, Parsing, set_parsers
 
 PROGRAM = "gltf-anim"
+MATPLOTLIB_FOLDER = "MPLCONFIGDIR"
 
 
 class LazyGroup(Parsing, TyperGroup):
@@ -108,6 +109,7 @@ def main() -> None:
     """Run the command line of this process and exit with its exit code."""
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends the process silently, as for other tools
+    folder = os.environ.get(MATPLOTLIB_FOLDER)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrix products are small: more threads only cost time
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of packages: they are for programmers, and stderr is for messages
@@ -116,10 +118,23 @@ def main() -> None:
     received = install_handlers()
     code = run(sys.argv[1:])
     code = 128 + received[0] if received else code
+    _remove_temporary_folder(folder)
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, AttributeError):  # closed by the parent process
             stream.flush()
     os._exit(code)  # without deallocating all objects first
+
+
+def _remove_temporary_folder(before: str | None) -> None:
+    """Remove the folder that matplotlib makes where the home folder can't be written, and puts into the environment.
+
+    It would do so itself at an exit other than `os._exit`. before: the variable at the start.
+    """
+    made = os.environ.get(MATPLOTLIB_FOLDER)
+    if made is not None and made != before:
+        import shutil
+
+        shutil.rmtree(made, ignore_errors=True)
 
 
 def _import_command(args: list[str]) -> None:

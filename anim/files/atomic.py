@@ -223,7 +223,9 @@ def mode_of(path: Path) -> int:
 
 
 def check_writable(path: Path) -> None:
-    """Raise OutputError for an existing file without write permission."""
+    """Raise OutputError for an existing file without write permission, and for links that lead to themselves."""
+    if os.path.islink(resolver.resolve_links(path)) and not os.path.exists(path):
+        raise OutputError(f"{path}: is a loop of links")
     if path.exists() and not os.access(path, os.W_OK):
         raise OutputError(f"{path}: is read-only")
 

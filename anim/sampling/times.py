@@ -12,7 +12,7 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import DataRangeError, RangeError, check_number
+from anim.errors import DataRangeError, RangeError, UnsupportedError, check_number
 
 MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
@@ -35,7 +35,8 @@ def check_fps(fps: float) -> None:
 def frame_times(start: float, end: float, *, fps: float) -> Floats:
     """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
 
-    fps: frames per second, > 0. Raises RangeError otherwise, or for a grid of over ten million frames.
+    fps: frames per second, > 0. Raises RangeError otherwise; for a grid of over ten million frames DataRangeError, at a
+    rate that no clip has UnsupportedError, like other limits of what is computed.
     frame_times(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
     frame_times(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
     """
@@ -44,7 +45,7 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     check_fps(fps)
     frames = (end - start) * fps
     if frames > MAX_FRAMES:
-        kind = DataRangeError if fps <= MAX_USUAL_FPS else RangeError  # the clip is too long, or the rate too high
+        kind = DataRangeError if fps <= MAX_USUAL_FPS else UnsupportedError  # the clip is too long, or the rate high
         raise kind(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
     sliver = max(MIN_INTERVAL_FRAMES, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)

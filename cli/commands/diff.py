@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import typer
 
+from anim.errors import AnimError
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
@@ -146,7 +147,10 @@ def command(
     fraction = radius / scale if radius and scale else None
     ruler = ErrorMetric(one.scene, other.scene, shell=fraction, clips=(*one.clips, *other.clips))
     chosen = selection.chosen_clips(one.file.clips) if clip else None
-    found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
+    try:
+        found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
+    except AnimError as error:
+        raise error.at(one.file.name, ": ") from None
     report = DiffReport(one.file, other.file, found, *_names(one, other), who, fps, radius, is_measured_at(one.scene))
     if report.are_strangers:
         reporter.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")

@@ -26,6 +26,7 @@ def inputs(path: str, stack: ExitStack) -> CacheFolder:
 
     Raises UsageError if stdin is a terminal; FormatError if a requested file can't be opened.
     """
+    documents.check_name(path)
     return CacheFolder(Path(path)) if path != documents.PIPE else _received(stack)
 
 

@@ -225,7 +225,14 @@ def called(path: str) -> str:
     return "stdin" if (step := step_streams()) is None else step.name
 
 
+def check_name(path: str) -> None:
+    """Raise FormatError for an empty path, which would be the current folder."""
+    if not path:
+        raise FormatError("is no file name")
+
+
 def _open_file(path: str, opener: Opener) -> Source:
+    check_name(path)
     located = locate(path)
     found = open_file(located, opener)
     record_files(Path(located), *buffer_files(found))
@@ -234,6 +241,7 @@ def _open_file(path: str, opener: Opener) -> Source:
 
 
 def _read_file(path: str, ending: str) -> Bytes:
+    check_name(path)
     located = Path(locate(path))
     found = resolver.read_file(located, ending)
     record_files(located)

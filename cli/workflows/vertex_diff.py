@@ -9,6 +9,7 @@ from pathlib import PurePath
 
 from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS
+from anim.errors import AnimError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.compare.vertex_distance import vertex_distance
@@ -58,7 +59,10 @@ def diff_by_vertex(
     with ExitStack() as stack:
         one, other = (stack.enter_context(_opened(path, reporter, opened)) for path in (old, new))
         label, first, second = _motions(one, other, clips, reporter)
-        times = common_times(first, second, fps)
+        try:
+            times = common_times(first, second, fps)
+        except AnimError as error:
+            raise error.at(one.name, ": ") from None
         found = vertex_distance(times, first.frames(times), second.frames(times), diagonal=first.diagonal())
         mesh, vertex = vertex_motion.locate(first if first.labels else second, max(found.vertex, 0))
         return VertexReport((one.name, other.name), (one.size, other.size), label, found, mesh, vertex, fps)

@@ -87,3 +87,11 @@ def test_a_folder_that_is_read_only(tmp_path: Path) -> None:
         assert (code, b"no permission" in err) == (3, True)
     finally:
         tmp_path.chmod(0o755)
+
+
+@pytest.mark.slow
+def test_a_plot_leaves_nothing_behind_where_the_home_can_not_be_written(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    code, _, err = run(f"plot walk.glb {tmp_path / 'a.svg'} -q", folder, {"HOME": "/proc/1", "TMPDIR": str(tmp_path)})
+    assert (code, err) == (0, b"")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]

@@ -126,3 +126,13 @@ def test_links_of_the_system_are_written_into(tmp_path: Path) -> None:
     (tmp_path / "walk.glb").write_bytes(built("biped"))
     run = shell("gltf-anim convert - /dev/stdout < walk.glb | cat", tmp_path)
     assert run.product() == fixtures.build("biped")
+
+
+@pytest.mark.parametrize("out", ["a.glb", "a.gltf", "a.npz"])
+def test_links_that_lead_to_themselves_are_not_replaced(out: str, call: Call, walk: Path, tmp_path: Path) -> None:
+    one, other = tmp_path / out, tmp_path / f"b{Path(out).suffix}"
+    one.symlink_to(other)
+    other.symlink_to(one)
+    line = ["bake", walk, one] if out == "a.npz" else ["convert", walk, one]
+    assert refusal(call(*line), 3) == f"gltf-anim: {one}: is a loop of links"
+    assert one.is_symlink()

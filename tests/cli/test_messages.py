@@ -204,7 +204,7 @@ def test_inputs_that_cannot_be_read_are_3(call: Call, tmp_path: Path) -> None:
         if name != "inspect":  # which looks for files in folders
             code = 3 if name == "sample" else 2  # they take folders, with --out
             assert f"{tmp_path}: is a folder" in refusal(call(name, tmp_path, *rest), code)
-        assert "'': is a folder" in refusal(call(name, "", *rest), 3)
+        assert refusal(call(name, "", *rest), 3) == "gltf-anim: '': is no file name"
         assert refusal(call(name, "-", *rest), 3) == "gltf-anim: stdin: is empty (expected glTF)"
 
 

@@ -192,7 +192,9 @@ def test_a_folder_that_is_not_there_is_no_file_name(call: Call, walk: Path, tmp_
         ("resample IN out.glb --fps 1e6", 4, "would take"),
         ("sample IN out.npz --fps 1e5", 2, "NPZ holds one clip"),
         ("sample IN out.json --fps 1e6", 4, "would take"),
-        ("resample IN out.glb --fps 1e9", 2, "frames at 1e+09 fps"),
+        ("resample IN out.glb --fps 1e9", 4, "frames at 1e+09 fps"),
+        ("resample IN out.glb --fps 1e300", 4, "frames at 1e+300 fps"),
+        ("diff IN IN --samples-per-second 1e9", 4, "walk.glb: clip 'walk': 1e+09 frames at 1e+09 fps"),
     ],
 )
 def test_many_keys_are_counted_before_they_are_computed(

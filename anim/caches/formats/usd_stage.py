@@ -12,6 +12,7 @@ from anim.caches import temporary_files
 from anim.caches.formats.usd_package import write_package
 from anim.caches.storage import Outputs, companion_name
 from anim.errors import UnsupportedError
+from anim.files.signals import hold_signals
 
 ROOT, MATERIALS = "/root", "/root/materials"
 USUAL_FPS = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)  # frame rates tried, in this order
@@ -33,7 +34,8 @@ def write_stage(outputs: Outputs, ending: str, name: str, build: Callable[[Any, 
     """Write a stage that `build` fills, and its images; return the result of `build`.
 
     ending: ".usdc" binary, ".usda" text, or ".usdz", a package with the images and the stage as `name`; otherwise the
-    images are beside it. build: keeps no reference to the stage. Raises UnsupportedError without usd-core.
+    images are beside it. build: keeps no reference to the stage, and holds signals while usd-core works, which
+    discards what a signal raises inside the Python that it calls. Raises UnsupportedError without usd-core.
     """
     usd, _, _ = package()
     from pxr import Tf
@@ -47,14 +49,16 @@ def write_stage(outputs: Outputs, ending: str, name: str, build: Callable[[Any, 
 
     with temporary_files.temp_output(outputs, outputs.main, ending, failures=(Tf.ErrorException,)) as path:
         binary = path if ending == ".usdc" else f"{path}.usdc"
-        stage = usd.Stage.CreateNew(binary)
+        with hold_signals():
+            stage = usd.Stage.CreateNew(binary)
         result = build(stage, save_image)
-        stage.GetRootLayer().Save()
-        if ending == ".usda":
-            stage.GetRootLayer().Export(path)
-        elif ending == ".usdz":
-            del stage
-            write_package(path, binary, images, name=name)
+        with hold_signals():
+            stage.GetRootLayer().Save()
+            if ending == ".usda":
+                stage.GetRootLayer().Export(path)
+            elif ending == ".usdz":
+                del stage
+                write_package(path, binary, images, name=name)
     for image, data in images if ending != ".usdz" else ():
         with outputs.create(image) as file:
             file.write(data)

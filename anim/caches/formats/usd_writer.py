@@ -32,6 +32,7 @@ from anim.caches.formats.usd_stage import (
 from anim.caches.options import WriteOptions, WriteResult
 from anim.caches.source_document.bake_source import BakeSource
 from anim.caches.storage import Outputs
+from anim.files.signals import hold_signals
 from anim.model import VertexCache
 
 DEFAULT_FPS = 24.0  # USD's own default
@@ -64,9 +65,35 @@ def _fill(
     _, geom, vt = package()
     rate = usual_rate(cache.times) or DEFAULT_FPS
     codes = np.round(cache.times * rate, 9).tolist()
-    set_metadata(stage, rate, codes, up=cache.up)
     layer = stage.GetRootLayer()
-    layer.customLayerData = {KEY: json.dumps(about(cache))}
+    with hold_signals():
+        set_metadata(stage, rate, codes, up=cache.up)
+        layer.customLayerData = {KEY: json.dumps(about(cache))}
+        mesh = _default_prim(stage, cache, source, save_image, note)
+    step = frame_blocks.per_chunk(cache.vertex_count)
+    points, normals, extent = mesh.GetPointsAttr(), mesh.GetNormalsAttr(), mesh.GetExtentAttr()
+    tangents = geom.PrimvarsAPI(mesh).GetPrimvar(TANGENTS).GetAttr()
+    for chunk in cache.chunks():
+        for i, positions in enumerate(chunk.positions):
+            code = codes[chunk.first + i]
+            with hold_signals():
+                points.Set(vectors(positions), code)
+                extent.Set(_bounds(positions), code)
+                if chunk.normals is not None:
+                    normals.Set(vectors(chunk.normals[i]), code)
+                if chunk.tangents is not None and cache.handedness is not None:
+                    tangents.Set(_signed(vt, chunk.tangents[i], cache.handedness), code)
+                if (chunk.first + i + 1) % step == 0:
+                    layer.Save()
+    with hold_signals():
+        layer.Save()
+
+
+def _default_prim(
+    stage: Any, cache: VertexCache, source: BakeSource | None, save_image: SaveImage, note: Callable[[str], None]
+) -> Any:
+    """Define the mesh, and with a source a root with it and its materials; return the mesh."""
+    _, geom, vt = package()
     mesh = _mesh(stage, cache, geom, vt, PRIM if source is None else f"{ROOT}{PRIM}")
     if source is None:
         stage.SetDefaultPrim(mesh.GetPrim())
@@ -75,21 +102,7 @@ def _fill(
         geom.Scope.Define(stage, MATERIALS)
         materials = UsdMaterials(source.document, stage, MATERIALS, save_image, note)
         bind_materials(cache, source.document, mesh, materials)
-    step = frame_blocks.per_chunk(cache.vertex_count)
-    points, normals, extent = mesh.GetPointsAttr(), mesh.GetNormalsAttr(), mesh.GetExtentAttr()
-    tangents = geom.PrimvarsAPI(mesh).GetPrimvar(TANGENTS).GetAttr()
-    for chunk in cache.chunks():
-        for i, positions in enumerate(chunk.positions):
-            code = codes[chunk.first + i]
-            points.Set(vectors(positions), code)
-            extent.Set(_bounds(positions), code)
-            if chunk.normals is not None:
-                normals.Set(vectors(chunk.normals[i]), code)
-            if chunk.tangents is not None and cache.handedness is not None:
-                tangents.Set(_signed(vt, chunk.tangents[i], cache.handedness), code)
-            if (chunk.first + i + 1) % step == 0:
-                layer.Save()
-    layer.Save()
+    return mesh
 
 
 def _mesh(stage: Any, cache: VertexCache, geom: Any, vt: Any, path: str) -> Any:

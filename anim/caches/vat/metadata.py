@@ -111,12 +111,14 @@ def parse(data: bytes) -> VatMetadata:
             str(content["up"]),
             int(content.get("uv_set", 1)),
         )
+        frames, height = len(found.times), found.rows * len(found.times)
+        counts_fit = (content.get("frames", frames), content.get("height", height)) == (frames, height)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise FormatError(NOT_METADATA) from None
     shapes_fit = len(found.offset) == len(found.scale) == 3 and found.format in FORMATS and found.times
     if not all(map(math.isfinite, (*found.offset, *found.scale, *found.times))):
         raise FormatError("JSON holds NaN or infinity")
-    if not shapes_fit or found.rows < 1 or not 0 < found.vertices <= found.width * found.rows:
+    if not (shapes_fit and counts_fit) or found.rows < 1 or not 0 < found.vertices <= found.width * found.rows:
         raise FormatError("JSON contradicts itself")
     return found
 

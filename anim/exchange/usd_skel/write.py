@@ -16,6 +16,7 @@ from anim.errors import NotFoundError
 from anim.exchange.usd_skel.measured_error import StageError, stage_error
 from anim.exchange.usd_skel.sample_times import frame_rate, sample_times
 from anim.exchange.usd_skel.stage import StageBuilder, StageTimes
+from anim.files.signals import hold_signals
 from anim.gltf.document import Document
 from anim.model import Clip, Scene
 from anim.sampling.times import check_fps
@@ -60,7 +61,8 @@ def write(
 
     def build(stage: Any, save_image: SaveImage) -> tuple[StageError, dict[int, str]]:
         builder = StageBuilder(stage, document, scene, clip, times)
-        builder.build(save_image, lambda words: notes.update({words: None}))
+        with hold_signals():
+            builder.build(save_image, lambda words: notes.update({words: None}))
         error = stage_error(stage, builder.prims, scene, clip, times.seconds, times.codes)
         return error, {node: str(prim.GetPath()) for node, prim in builder.prims.items()}
 

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.errors import AnimError
+from anim.gltf.reading.reader import clip_label
 from anim.measure.compare import name_matching
 from anim.measure.compare.correspondence import Correspondence
 from anim.measure.compare.equal_scenes import are_equal
@@ -171,7 +173,10 @@ def _compare_pairs(
             found.append(found[first[n]]._replace(old=i, new=j, name=old[i].name, new_name=new[j].name))
             continue
         before, after = old[i], new[j]
-        times = dense_times(before, after, fps=fps)
+        try:
+            times = dense_times(before, after, fps=fps)
+        except AnimError as error:
+            raise error.at(clip_label(before.name, i)) from None
         if alike and before.tracks == after.tracks:
             measured = _Measured(MotionError(0.0, float(times[0]), "", "", len(times)), 0.0, STILL)
         else:

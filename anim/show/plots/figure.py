@@ -7,6 +7,7 @@ color-blind viewers (Okabe & Ito 2008), with the usual red, green, blue for x, y
 from __future__ import annotations
 
 import io
+import logging
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -104,6 +105,7 @@ def style(kind: str) -> Iterator[None]:
     if kind not in FORMATS:
         raise RangeError(f"`format` is '{kind}' (expected {' or '.join(FORMATS)})")
     try:
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns where the home folder can't be written
         import matplotlib
     except ImportError:
         raise UnsupportedError("pictures need matplotlib, which is not installed", help=INSTALL) from None

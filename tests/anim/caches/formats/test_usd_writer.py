@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import signal
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from anim.caches.formats import usd_writer
+from anim.caches.formats.usd_stage import vectors
 from anim.caches.storage import Memory
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import FormatError
@@ -115,3 +119,19 @@ def test_cut_off_files_are_refused_in_silence(ending: str, cut: float, capfd: py
 def test_wrong_stages_are_refused(change: tuple[str, str]) -> None:
     with pytest.raises(FormatError):
         opened(Memory("a.usda", {"a.usda": SCENE.replace(*change).encode()})).load_all()
+
+
+def test_a_signal_that_usd_core_discards_ends_the_writing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It calls Python, as for modules on their first use, and an exception there is lost."""
+    converted: list[None] = []
+
+    def convert(rows: Any) -> Any:
+        converted.append(None)
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return vectors(rows)
+
+    monkeypatch.setattr(usd_writer, "vectors", convert)
+    with pytest.raises(KeyboardInterrupt):
+        written(cache(), "a.usdc")
+    assert len(converted) == 2  # points and extent at rest

@@ -178,6 +178,15 @@ def test_damaged_or_missing_files_are_refused(name: str, cut: int | None) -> Non
         opened(files).load_all()
 
 
+@pytest.mark.parametrize("name", ["frames", "height"])
+def test_a_json_that_contradicts_its_times_is_refused(name: str) -> None:
+    files, _ = written(cache(), "a.png")
+    content = json.loads(files.files["a.png.json"])
+    files.files["a.png.json"] = json.dumps({**content, name: 10**9}).encode()
+    with pytest.raises(FormatError, match="contradicts itself"):
+        opened(files)
+
+
 def test_companions_are_those_that_the_json_names() -> None:
     """Earlier versions called them a-mesh.glb and a-normal.png."""
     files, _ = written(cache(), "a.png")
