@@ -87,11 +87,13 @@ def _sample_batch(player: PlayerModel, batch: Batch | MixedBatch, at: Floats, pl
 def _mix(player: PlayerModel, keys: Floats, left: Ints, u: Floats) -> Floats:
     """Mixes of neighboring keys (K, ..., 4): each of `left` (F,) and the next, at parameters u (F, ...).
 
-    What depends on the keys alone is computed once per key, not per time.
+    What depends on the keys alone is computed once per key or once per time, whichever is less.
     """
-    first = int(left.min())
-    keys, left = keys[first : int(left.max()) + 2], left - first
-    a, b = keys[:-1], keys[1:]
+    first, last = int(left.min()), int(left.max())
+    if last - first < len(left):
+        a, b, left = keys[first : last + 1], keys[first + 1 : last + 2], left - first
+    else:  # as of a few times of many tracks, whose keys are concatenated
+        a, b, left = keys[left], keys[left + 1], np.arange(len(left))
     b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
     theta, divided = player.arc(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0))
     if theta.any():
