@@ -16,6 +16,7 @@ from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.reader import clip_name
 from anim.gltf.validation.animation_storage import badly_stored
 from anim.gltf.writing import writer
+from anim.measure.continuous_bound.clip_groups import largest_error_of, worst_proof
 from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.measure.equal_clips import first_equal, repeat_change
@@ -152,31 +153,21 @@ def _measured(
         hint = f" ({error.help})" if error.help else ""
         reporter.warn(f"measured at nodes, not on the surface: {error}{hint}")
     prover = Prover(ErrorMetric(scene, clips=(*edited.before.values(), *edited.after.values())))
-    measured: list[Proof] = []
-    first = first_equal([(before, edited.after[i]) for i, before in edited.before.items()])
+    pairs = [(before, edited.after[i]) for i, before in edited.before.items()]
+    first = first_equal(pairs)
     _warn_of_non_unit_keys(edited, first, reporter)
-    floor = 0.0
-    for n, (i, before) in enumerate(edited.before.items()):
-        if first[n] < n:
-            found = measured[first[n]]
-        else:
-            found = largest_error(prover, before, edited.after[i], floor=0.0 if reporter.verbose else floor)
-        floor = max(floor, found.error.max_error)
-        measured.append(found)
-        counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
-        reporter.verbose_info(
-            f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found, prover.ruler.diagonal)}"
-        )
-    return EditResult(edited.before, edited.after, _worst(measured), prover.ruler.diagonal, error is not None)
-
-
-def _worst(measured: list[Proof]) -> Proof | None:
-    """Largest measured error of all clips, and its bound."""
-    if not measured:
-        return None
-    worst = max(measured, key=lambda each: each.error.max_error)
-    bounds = [each.bound for each in measured if each.bound is not None]
-    return worst._replace(bound=max(bounds) if len(bounds) == len(measured) else None)
+    distinct = sorted(set(first))
+    if reporter.verbose:
+        found = {n: largest_error(prover, *pairs[n]) for n in distinct}
+        for (i, before), n in zip(edited.before.items(), first, strict=True):
+            counts = f"{_keys(before)} → {_keys(edited.after[i])} keys"
+            reporter.verbose_info(
+                f"  {reader.clip_label(before.name, i)}: {counts}, {_error(found[n], prover.ruler.diagonal)}"
+            )
+        worst = worst_proof(list(found.values()))
+    else:
+        worst = largest_error_of(prover, [pairs[n] for n in distinct])
+    return EditResult(edited.before, edited.after, worst, prover.ruler.diagonal, error is not None)
 
 
 def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], reporter: text.Reporter) -> None:

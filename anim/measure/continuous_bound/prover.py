@@ -21,7 +21,7 @@ BOUND_SLACK = 0.01  # of the largest distance: a bound this close to it is not r
 MAX_REFINED_DEPTH = 256  # levels of the metric's skeletons; bounds of deeper ones are too loose for any samples
 PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # players with normalized arcs are adjacent
 LARGE_SKELETON = 1000  # moving nodes; from here on a step is LARGE_STEP_FRACTION as long, for memory
-LARGE_STEP_FRACTION = 0.125
+LARGE_STEP_FRACTION = 0.5
 BLOCK = 250_000  # players × intervals × groups and nodes per step, each up to 800 bytes
 
 
