@@ -6,6 +6,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
+from anim.memory import MemoryBudget
 from anim.model import Mesh, Skeleton, Skin
 from anim.sampling import rest_world
 
@@ -14,6 +15,7 @@ WIDEST_FRACTION = 0.18  # fraction of a stick's length from the joint to its wid
 RADIUS_PER_LENGTH = 0.07  # radius / length
 MIN_LENGTH_FRACTION = 1e-4  # fraction of the skeleton's size; shorter sticks are omitted
 MAX_RADIUS, MIN_RADIUS = 0.02, 0.004  # fractions of the skeleton's size
+BYTES_PER_STICK = 24 * 512  # of 24 vertices, bound and baked
 END_LENGTH_FRACTION = 0.02  # fraction of the size: stick length of a joint without children
 
 
@@ -21,6 +23,7 @@ def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[
     """Return a mesh bound to the skeleton, and its skin; each stick follows its start joint.
 
     ends: nodes that only mark the end of their parent. Normals are those of flat faces.
+    Raises UnsupportedError for more sticks than the limit of memory allows to bake.
     """
     joints: Ints = np.array([i for i in range(len(skeleton)) if i not in ends], np.int64)
     place_of = {int(node): place for place, node in enumerate(joints)}
@@ -28,6 +31,7 @@ def stick_mesh(skeleton: Skeleton, ends: frozenset[int] = frozenset()) -> tuple[
     places = world[:, :, 3]
     size = float(np.ptp(places, axis=0).max()) or 1.0
     starts, tips, owners = _lines(skeleton, places, ends, size)
+    MemoryBudget(0).check(BYTES_PER_STICK * len(starts))
     corners = _bipyramids(starts, tips, size).reshape(-1, 3)
     normals = np.repeat(_normals(corners.reshape(-1, 3, 3)), 3, axis=0)
     holders: Ints = np.zeros((len(corners), 4), np.int64)

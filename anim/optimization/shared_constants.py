@@ -162,12 +162,9 @@ def _has_tangents(track: Track) -> bool:
 def _meters_per_unit(context: Context, animated: Iterable[int]) -> tuple[Floats, Floats, Floats]:
     """Displacement of a point per unit of translation, rotation and scale (N,) of animated nodes, at rest."""
     world, skeleton = context.rest_world, context.skeleton
-    places = context.points.places(world[:, None])[:, 0]
-    count = len(skeleton)
-    reach = np.zeros(count)
-    for node in animated:
-        mine = places[context.answering.of(node)]
-        reach[node] = np.linalg.norm(mine - world[node, :, 3], axis=1).max(initial=0.0)
+    places = np.swapaxes(context.points.places(world[:, None]), 1, 2)
+    reach, chosen = np.zeros(len(skeleton)), sorted(animated)
+    reach[chosen] = context.answering.radii(places, chosen, world[chosen][..., 3:])
     lengths = np.sqrt((world[..., :3] ** 2).sum(axis=-2)).max(axis=1)
     widening = np.where(skeleton.parents < 0, 1.0, lengths[skeleton.parents])
     return widening, 2 * reach, reach / np.maximum(np.abs(skeleton.scale).min(axis=1), 1e-6)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from anim.exchange import stick_mesh
 from anim.exchange.euler import curve
 from anim.maths import quaternion
 from anim.measure.continuous_bound import interval_rise
@@ -13,6 +14,7 @@ from anim.measure.error.metric import ErrorMetric
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
+from tests.cli.running import refusal
 
 NODES = 300
 MAX_CALLS = 100  # of a function on quaternions, in one command
@@ -76,3 +78,15 @@ def test_tracks_of_one_time_axis_are_changed_together(
     call(*({"IN": tmp_path / "in.glb", "OUT": tmp_path / "out.glb"}.get(each, each) for each in line)).product()
     assert all(len(each) < MAX_CALLS for each in counted)
     assert any(counted)
+
+
+def test_sticks_for_too_many_nodes_are_refused_before_they_are_made(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = count_calls(monkeypatch, stick_mesh, "_bipyramids")
+    (tmp_path / "in.glb").write_bytes(many.chain_open(NODES))
+    line = ["render", tmp_path / "in.glb", tmp_path / "out.png", "--size", "64", "--memory-limit"]
+    assert "decoded data" in refusal(call(*line, "1MB"), 4)
+    assert not made
+    call(*line, "1GB").product()
+    assert made

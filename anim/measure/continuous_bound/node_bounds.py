@@ -14,7 +14,7 @@ from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
 from anim.measure.continuous_bound.intervals import Intervals
 from anim.measure.continuous_bound.rotation_bounds import rotation_bounds
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
-from anim.measure.continuous_bound.track_partition import ClipVersion, pick_tracks
+from anim.measure.continuous_bound.track_partition import ClipVersion, node_block, pick_tracks
 from anim.model import Skeleton
 from anim.sampling.batch import Batch
 
@@ -151,14 +151,15 @@ def _late(version: ClipVersion, where: Intervals) -> set[int]:
 def _groups(
     first: ClipVersion, second: ClipVersion, path: str, where: Intervals, uneven: Collection[int] = ()
 ) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Intervals]]:
-    """Nodes that move in either version, with tracks and all intervals; then the others of `uneven`.
+    """Nodes that move in either version, by blocks, with tracks and all intervals; then the others of `uneven`.
 
     The latter with one interval, since all are equal.
     """
     moving = (_of_path(first.moving, path), _of_path(second.moving, path))
     movers = _nodes(*moving)
-    if movers:
-        yield np.array(sorted(movers), np.int64), moving, where
+    for block in sorted({node_block(batch) for side in moving for batch in side}):
+        one, other = ([batch for batch in side if node_block(batch) == block] for side in moving)
+        yield np.array(sorted(_nodes(one, other)), np.int64), (one, other), where
     if others := set(uneven) - movers:
         still = [_of_nodes(_of_path(version.still, path), others) for version in (first, second)]
         yield np.array(sorted(others), np.int64), (still[0], still[1]), where.first

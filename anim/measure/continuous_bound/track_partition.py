@@ -12,11 +12,13 @@ from anim.arrays import Bools
 from anim.model import Clip, Scene, Skeleton, TimeAxis
 from anim.sampling.batch import Batch, batches
 
+BLOCK_NODES = 2048  # of moving nodes bounded at a time
+
 
 class ClipVersion(NamedTuple):
     """One version: nodes at rest, tracks of nodes that move in either, constant tracks with one key each.
 
-    All stacked.
+    All stacked, moving ones by blocks of nodes too, for memory.
     """
 
     skeleton: Skeleton
@@ -47,7 +49,7 @@ def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | No
     for batch in of:
         moves = np.array([(track.node, track.path) in moving for track in batch.tracks])
         if moves.any():
-            side.moving.append(pick_tracks(batch, moves))
+            side.moving.extend(_by_block(pick_tracks(batch, moves)))
         if not moves.all():
             rest = pick_tracks(batch, ~moves)
             tangents = None if rest.tangents is None else (rest.tangents[0][:1], rest.tangents[1][:1])
@@ -55,6 +57,17 @@ def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | No
                 replace(rest, time_axis=TimeAxis(rest.times[:1]), values=rest.values[:1], tangents=tangents)
             )
     return side
+
+
+def node_block(batch: Batch) -> int:
+    """Return the number of the block of nodes that all tracks of a moving batch belong to."""
+    return (batch.tracks[0].node or 0) // BLOCK_NODES
+
+
+def _by_block(batch: Batch) -> Iterable[Batch]:
+    """The batch divided by blocks of nodes."""
+    blocks = np.array([track.node for track in batch.tracks]) // BLOCK_NODES
+    return (pick_tracks(batch, blocks == block) for block in sorted(set(blocks.tolist())))
 
 
 def _is_constant(batch: Batch) -> Bools:

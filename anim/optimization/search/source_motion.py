@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
@@ -232,12 +231,9 @@ def _influence_radius(
     """For each node, the largest distance of the points it moves, in metres."""
     frames = world[:, :: max(1, -(-world.shape[1] // PROBE_FRAMES))]
     places = np.swapaxes(points.places(frames), 1, 2)  # (P, 3, F)
-    found = {}
-    for node in nodes:
-        away = places[answering.of(node)] - frames[node, :, :, 3].T
-        away *= away
-        found[node] = math.sqrt((away[:, 0] + away[:, 1] + away[:, 2]).max(initial=0.0))
-    return found
+    chosen = sorted(nodes)
+    centers = np.swapaxes(frames[chosen, :, :, 3], 1, 2)
+    return dict(zip(chosen, answering.radii(places, chosen, centers).tolist(), strict=True))
 
 
 def _on_moving_nodes(

@@ -9,6 +9,7 @@ from anim.arrays import Floats, Ints
 from anim.measure.error.point_matrix import CARRIED, PointMatrix
 from anim.optimization.search import answering_points
 from anim.optimization.search.answering_points import AnsweringPoints
+from tests.calls import count_calls
 
 NODES, POINTS = 12, 60
 
@@ -61,6 +62,33 @@ def test_maxima_of_nested_points_take_few_steps(monkeypatch: pytest.MonkeyPatch)
     values = np.random.default_rng(0).random(count)
     found = AnsweringPoints(points, np.arange(-1, count - 1)).largest(values, range(count))
     assert found.tolist() == np.maximum.accumulate(values[::-1])[::-1].tolist()
+
+
+@pytest.mark.parametrize("width", [1, 4])
+@pytest.mark.parametrize("seed", range(4))
+def test_radii_of_every_node(seed: int, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The largest distance of a node's points, in whatever blocks they are looked for."""
+    points, parents = random_case(seed, width)
+    random = np.random.default_rng(seed)
+    places, centers = random.normal(size=(POINTS, 3, 5)), random.normal(size=(NODES, 3, 5))
+    found, expected = AnsweringPoints(points, parents), []
+    for node in range(NODES):
+        away = places[points_on(points, parents, node)] - centers[node]
+        expected.append(np.sqrt((away * away).sum(axis=1)).max(initial=0))
+    np.testing.assert_allclose(found.radii(places, range(NODES), centers), expected, rtol=1e-15)
+    monkeypatch.setattr(answering_points, "MIN_OVERLAP", 0)
+    monkeypatch.setattr(answering_points, "BLOCK", 7)
+    np.testing.assert_allclose(found.radii(places, range(NODES), centers), expected, rtol=1e-15)
+
+
+def test_radii_in_a_chain_look_into_few_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    count = 2000
+    points = PointMatrix(np.arange(count), np.arange(count)[:, None], np.ones((count, 1, 4)))
+    places = np.linspace([[0.0]] * 3, [[1.0]] * 3, count)
+    looked = count_calls(monkeypatch, answering_points, "_farthest")
+    found = AnsweringPoints(points, np.arange(-1, count - 1)).radii(places, range(count), places)
+    np.testing.assert_allclose(found, np.linspace(np.sqrt(3), 0, count), atol=1e-12)
+    assert len(looked) <= 2 * count
 
 
 def test_no_points() -> None:
