@@ -30,7 +30,7 @@ CONSTANT_BUDGET_FACTOR = 1.5  # times a track's budget: tolerance for dropping i
 QUANTIZATION_BUDGET_FRACTION = 0.5  # of a budget
 CHORD_BOUND_FRACTION = 0.02  # of the bound; if slerp and nlerp are closer, only slerp is measured
 MIN_INTERVAL_S = 1e-4  # s; minimum time step of a speed
-MAX_BLOCK_MATRICES = 500_000  # world matrices of nodes at a time: 48 MB; more are measured in blocks of times
+MAX_BLOCK_MATRICES = 100_000  # world matrices of nodes at a time: 10 MB; more are measured in blocks of times
 MIN_BLOCK_TIMES = 64
 
 
