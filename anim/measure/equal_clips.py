@@ -5,7 +5,6 @@ from __future__ import annotations
 import operator
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 
 from anim.model import Clip
 
@@ -32,7 +31,7 @@ def track_digests(clip: Clip) -> tuple[bytes, ...]:
 def repeat_change(clip: Clip, old: Clip, new: Clip) -> Clip:
     """Return a clip after the change that made `new` of `old`, a clip with equal tracks; itself if nothing changed."""
     is_same = len(new.tracks) == len(old.tracks) and all(map(operator.is_, new.tracks, old.tracks))
-    return clip if is_same else replace(new, name=clip.name)
+    return clip if is_same else Clip(clip.name, new.tracks)
 
 
 def _size(clip: Clip) -> tuple[int, ...]:

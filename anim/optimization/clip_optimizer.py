@@ -36,12 +36,6 @@ class ClipResult:
     verdict: Verification
     without_loss: bool = False
 
-    def named(self, name: str) -> ClipResult:
-        """Return the result for a clip of equal tracks with another name."""
-        if self.solution.clip.name == name:
-            return self
-        return replace(self, solution=replace(self.solution, clip=replace(self.solution.clip, name=name)))
-
 
 class ClipOptimizer:
     """Data shared by all clips of a file in one process; each part is computed on first use.

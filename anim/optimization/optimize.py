@@ -93,8 +93,8 @@ def optimize(
         for (number, _), each in zip(distinct, results, strict=True):
             found[number] = each
             progress(len(found) / len(distinct))
-    found = {number: found[tasks[first[n]][0]].named(clips[number].name) for n, (number, _) in enumerate(tasks)}
-    solutions = {number: each.solution for number, each in found.items()}
+    found = {number: found[tasks[first[n]][0]] for n, (number, _) in enumerate(tasks)}
+    solutions = {number: each.solution.named(clips[number].name) for number, each in found.items()}
     verdicts = {number: each.verdict for number, each in found.items()}
     without_loss = [number for number, each in found.items() if each.without_loss]
     new = write_solutions(base.document if base else document, solutions, request.packing)

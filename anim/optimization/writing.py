@@ -21,11 +21,15 @@ KEY = "gltf-anim"
 
 def write_solutions(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
     """Return the document with the clips indexed in `solutions` in place of its own; no unused accessors."""
-    clips = {
-        i: replace(each.clip, tracks=tuple(map(_with_codes, each.clip.tracks, each.stored)))
-        for i, each in sorted(solutions.items())
-    }
+    clips = {i: _clip(each) for i, each in sorted(solutions.items())}
     return reindex.drop_placeholders(writer.replace_clips(document, clips, extension=packing.extension))
+
+
+def _clip(solution: Solution) -> Clip:
+    """The clip with the codes of its tracks, if any has some."""
+    if all(keys.form not in FILTERS for keys in solution.stored):
+        return solution.clip
+    return Clip(solution.clip.name, tuple(map(_with_codes, solution.clip.tracks, solution.stored)))
 
 
 def _with_codes(track: Track, stored: EncodedKeys) -> Track:

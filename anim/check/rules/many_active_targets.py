@@ -19,9 +19,9 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for report, clip in file.clips:
         tracks = resolve_weight_pointers(file.skeleton, clip).tracks
         weights = [track.values for track in tracks if track.path == "weights"]
-        most = max((int((np.abs(values) > MIN_WEIGHT).sum(axis=1).max()) for values in weights), default=0)
-        if most > parameters["targets"]:
-            yield file.in_clip(report.index, value=most)
+        most = [int((np.abs(values) > MIN_WEIGHT).sum(axis=1).max()) for values in weights]
+        if most and max(most) > parameters["targets"]:
+            yield file.in_clip(report.index, value=max(most))
 
 
 def problem(found: Sequence[Occurrence]) -> str:

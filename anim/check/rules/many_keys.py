@@ -19,9 +19,9 @@ FPS = 60.0  # of a fixed track
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with their highest rate."""
     for report, clip in file.clips:
-        rate = max(map(_rate, clip.time_axes), default=0.0)
-        if rate > parameters["rate"]:
-            yield file.in_clip(report.index, value=rate)
+        rates = [_rate(axis) for axis in clip.time_axes]
+        if rates and max(rates) > parameters["rate"]:
+            yield file.in_clip(report.index, value=max(rates))
 
 
 def _rate(axis: TimeAxis) -> float:

@@ -16,8 +16,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such keys."""
     for report, clip in file.clips:
         weights = [track.values for track in clip.tracks if _moves_weights(track)]
-        keys = sum(int(((values < -TOLERANCE) | (values > 1 + TOLERANCE)).any(axis=1).sum()) for values in weights)
-        if keys:
+        outside = [((values < -TOLERANCE) | (values > 1 + TOLERANCE)).any(axis=1).sum() for values in weights]
+        if keys := int(sum(outside)):
             yield file.in_clip(report.index, keys)
 
 

@@ -78,6 +78,10 @@ class Solution:
     stored: tuple[EncodedKeys, ...]
     dropped: tuple[int, ...]
 
+    def named(self, name: str) -> Solution:
+        """Return the solution for a clip of equal tracks with another name."""
+        return self if name == self.clip.name else Solution(Clip(name, self.clip.tracks), self.stored, self.dropped)
+
     def size(self, coding: Encoding) -> float:
         """Return the approximate number of bytes of the clip."""
         tracks, prices = self.clip.tracks, coding.byte_costs
