@@ -34,7 +34,7 @@ def value_line(track: Track) -> Polyline:
         return _holds(track)
     if track.interpolation is Interpolation.LINEAR and track.kind is not ValueKind.ROTATION:
         return Polyline(track.times, track.values)
-    times = _points(track, pieces_only=False)[0].reshape(-1)
+    times = track.times if is_dense(track) else _points(track, pieces_only=False)[0].reshape(-1)
     return Polyline(times, sample(track, times))
 
 
