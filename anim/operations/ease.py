@@ -23,6 +23,7 @@ TOLERANCE = 1e-3  # of a segment's range
 ANGLE_TOLERANCE_RAD = math.radians(0.05)
 OUTPUTS = ("cubicspline", "linear")
 MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
+MAX_COMPARED_BYTES = 1 << 16  # of values of tracks that are compared; longer ones take as long
 EDGE_TOLERANCE_S = 1e-6  # s; a segment that starts less than this before `start` counts as inside
 
 
@@ -63,7 +64,32 @@ def ease(
     easing = table.parse(easing) if isinstance(easing, str) else easing
     check_type(easing, Easing, "easing", help="anim.EASINGS has their names")
     job = _Job(easing, start, end, tolerances, interpolation)
-    return Clip(clip.name, tuple(job.eased(t) if i in chosen else t for i, t in enumerate(clip.tracks)))
+    made: dict[object, tuple[Track, Track]] = {}  # many tracks are equal but for their node, as constant scales
+    new = list(clip.tracks)
+    for i in sorted(chosen):
+        track = new[i]
+        keys = _compared(track) if track.values.nbytes <= MAX_COMPARED_BYTES else i
+        if keys not in made:
+            made[keys] = track, job.eased(track)
+        new[i] = _repeat(track, *made[keys])
+    return Clip(clip.name, tuple(new))
+
+
+def _compared(track: Track) -> tuple[object, ...]:
+    """All that easing depends on."""
+    parts = (track.values, track.in_tangents, track.out_tangents)
+    keys = (None if part is None else part.tobytes() for part in parts)
+    return track.time_axis, track.interpolation, track.kind, track.values.shape, *keys
+
+
+def _repeat(track: Track, equal: Track, eased: Track) -> Track:
+    """A track after the change that made `eased` of one that is equal but for its target."""
+    if eased is equal:
+        return track
+    if equal is track:
+        return eased
+    keys = (eased.time_axis, eased.values, eased.in_tangents, eased.out_tangents)
+    return track.with_keys(*keys, interpolation=eased.interpolation)
 
 
 @dataclass(frozen=True, slots=True)
