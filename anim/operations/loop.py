@@ -12,7 +12,7 @@ from anim.errors import RangeError, check_number
 from anim.maths import hermite, quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
-from anim.operations.track_stack import TrackStack, change_tracks
+from anim.operations.stacked_tracks import StackedTracks, change_tracks
 from anim.operations.trim import cut_spline
 from anim.sampling.derivatives import rates
 from anim.sampling.times import check_fps, distinct_float32, min_interval
@@ -116,7 +116,7 @@ class _Blend(NamedTuple):
     frame_rate: float | None
 
 
-def _close(tracks: TrackStack, blend: _Blend) -> Sequence[Track]:
+def _close(tracks: StackedTracks, blend: _Blend) -> Sequence[Track]:
     if len(tracks.times) == 1:
         return tracks.tracks
     ends = np.array([blend.first, blend.end])
@@ -141,7 +141,7 @@ def _close(tracks: TrackStack, blend: _Blend) -> Sequence[Track]:
 
 
 def _correct(
-    tracks: TrackStack, blend: _Blend, first: Floats, speed: Floats, *, gap: Floats, change: Floats
+    tracks: StackedTracks, blend: _Blend, first: Floats, speed: Floats, *, gap: Floats, change: Floats
 ) -> list[Track]:
     """The tracks, of which a clip starts with values `first` and `speed` (G, C), without the gaps at its end."""
     times = _times(tracks, blend.start, blend.end, blend.frame_rate)
@@ -155,7 +155,7 @@ def _correct(
     return _correct_linear(tracks, times, _Correction(blend.start, blend.end, gap, slope))
 
 
-def _close_steps(tracks: TrackStack, end: float, first: Floats) -> list[Track]:
+def _close_steps(tracks: StackedTracks, end: float, first: Floats) -> list[Track]:
     """STEP tracks with their first value (G, C) at the end of the clip, which may be after their last key."""
     if tracks.times[-1] > end - min_interval(end, MIN_INTERVAL_S):
         values = np.concatenate((tracks.values[:-1], first[None]))
@@ -166,7 +166,7 @@ def _close_steps(tracks: TrackStack, end: float, first: Floats) -> list[Track]:
     return [old if is_same else new for old, new, is_same in zip(tracks.tracks, closed, same, strict=True)]
 
 
-def _without_last_jump(track: TrackStack) -> TrackStack:
+def _without_last_jump(track: StackedTracks) -> StackedTracks:
     """Return tracks without a jump between their last two keys, which the correction replaces."""
     before, after = track.in_tangents, track.out_tangents
     times, values = np.append(track.times[:-2], track.times[-1]), track.values[:-1]
@@ -175,13 +175,13 @@ def _without_last_jump(track: TrackStack) -> TrackStack:
     return track.with_keys(times, values, before[:-1], after[:-1])
 
 
-def _closing_offset(track: TrackStack, first: Floats, last: Floats) -> Floats:
+def _closing_offset(track: StackedTracks, first: Floats, last: Floats) -> Floats:
     if track.kind is ValueKind.ROTATION:
         return quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(last), first))
     return first - last
 
 
-def _extrapolate(track: Track | TrackStack, value: Floats, speed: Floats, seconds: float) -> Floats:
+def _extrapolate(track: Track | StackedTracks, value: Floats, speed: Floats, seconds: float) -> Floats:
     """Return the value some seconds after `value` at constant speed."""
     if track.kind is ValueKind.ROTATION:
         return quaternion.multiply(value, quaternion.from_rotation_vector(seconds * speed))
@@ -220,12 +220,12 @@ class _Correction:
         return (times > self.start)[:, None, None]
 
 
-def _correct_linear(track: TrackStack, times: Floats, correction: _Correction) -> list[Track]:
+def _correct_linear(track: StackedTracks, times: Floats, correction: _Correction) -> list[Track]:
     values = _add_correction(track, sample(track, times), correction.value(times))
     return track.with_keys(times, values).split()
 
 
-def _times(track: TrackStack, start: float, end: float, frame_rate: float | None) -> Floats:
+def _times(track: StackedTracks, start: float, end: float, frame_rate: float | None) -> Floats:
     """Return the track's key times with the ends of the blend and, for sparse keys, some between."""
     keys = track.times
     inside = keys[(keys > start) & (keys < end)]
@@ -245,13 +245,13 @@ def _added_times(start: float, end: float, frame_rate: float | None) -> Floats:
     return np.append(frames[frames < end - 0.5 / frame_rate], end)
 
 
-def _add_correction(track: TrackStack, values: Floats, added: Floats) -> Floats:
+def _add_correction(track: StackedTracks, values: Floats, added: Floats) -> Floats:
     if track.kind is not ValueKind.ROTATION:
         return values + added
     return quaternion.align_signs(quaternion.multiply(values, quaternion.from_rotation_vector(added)))
 
 
-def _correct_spline(track: TrackStack, times: Floats, correction: _Correction) -> list[Track]:
+def _correct_spline(track: StackedTracks, times: Floats, correction: _Correction) -> list[Track]:
     before = rates(track, times, before=True) + correction.slope(times)
     after = rates(track, times, before=False) + correction.slope(times)
     values = _add_correction(track, sample(track, times), correction.value(times))

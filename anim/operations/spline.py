@@ -21,9 +21,9 @@ from anim.errors import AnimError, RangeError
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
-from anim.operations.track_stack import TrackStack, change_tracks
+from anim.operations.stacked_tracks import StackedTracks, change_tracks
 
-Keyed = TypeVar("Keyed", Track, TrackStack)
+Keyed = TypeVar("Keyed", Track, StackedTracks)
 MIN_VECTOR_RANGE = 1e-3  # lower limit of a vector track's largest value, for the comparison of its ends
 END_TOLERANCE_FRACTION = 1e-6  # of the clip's end: differences of float32 times by rounding
 
@@ -53,7 +53,7 @@ def spline(
     rule = parse(tangents) if isinstance(tangents, str) else tangents
     is_loop = cyclic or rule.loop
 
-    def apply(tracks: TrackStack) -> Sequence[Track]:
+    def apply(tracks: StackedTracks) -> Sequence[Track]:
         if not _takes_tangents(tracks):
             return tracks.tracks
         if not (rule.smooth or rule.by_path):
@@ -107,7 +107,7 @@ def _span(track: Keyed, clip: Clip) -> Keyed:
     return track.with_keys(times, track.values[keys], interpolation=Interpolation.LINEAR)  # tangents follow
 
 
-def _takes_tangents(track: TrackStack) -> bool:
+def _takes_tangents(track: StackedTracks) -> bool:
     is_step = track.interpolation is Interpolation.STEP or track.kind is ValueKind.DISCRETE
     return not is_step and len(track.times) > 1
 

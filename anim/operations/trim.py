@@ -15,11 +15,11 @@ from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.retime import shift_time
 from anim.operations.selection import track_indices
-from anim.operations.track_stack import TrackStack, change_tracks
+from anim.operations.stacked_tracks import StackedTracks, change_tracks
 from anim.sampling.derivatives import rates
 from anim.sampling.track import Keys, sample
 
-Spline = TypeVar("Spline", Track, TrackStack)
+Spline = TypeVar("Spline", Track, StackedTracks)
 ANGLE_TOLERANCE_RAD = math.radians(0.001)  # between a cut of a rotation spline and the next key; ends are exact
 
 
@@ -72,7 +72,7 @@ def _nothing_left(clip: Clip, start: float | None, end: float | None) -> str:
     return f"end {end or 0.0:g} s must be after start {start or 0.0:g} s"
 
 
-def _trim_tracks(tracks: TrackStack, start: float, end: float) -> Sequence[Track]:
+def _trim_tracks(tracks: StackedTracks, start: float, end: float) -> Sequence[Track]:
     inner = (tracks.times > start) & (tracks.times < end)
     if len(tracks.times) == 1:
         return _single_key(tracks, start).split()
@@ -87,7 +87,7 @@ def _trim_tracks(tracks: TrackStack, start: float, end: float) -> Sequence[Track
     return found
 
 
-def _cut(tracks: TrackStack, start: float, end: float) -> Sequence[Track]:
+def _cut(tracks: StackedTracks, start: float, end: float) -> Sequence[Track]:
     if tracks.interpolation is Interpolation.CUBICSPLINE:
         if tracks.kind is ValueKind.ROTATION:  # with added keys of its own each
             return [cut_spline(track, start, end) for track in tracks.split()]
@@ -100,7 +100,7 @@ def _cut(tracks: TrackStack, start: float, end: float) -> Sequence[Track]:
     return tracks.with_keys(times, values).split()
 
 
-def _changes(tracks: TrackStack, start: float, end: float) -> Bools:
+def _changes(tracks: StackedTracks, start: float, end: float) -> Bools:
     """Mask (G,) of tracks without a key in between that have different end values or a non-zero speed there."""
     ends = sample(tracks, np.array([start, end]))
     found: Bools = (ends[0] != ends[1]).any(axis=-1)
@@ -109,7 +109,7 @@ def _changes(tracks: TrackStack, start: float, end: float) -> Bools:
     return found
 
 
-def _single_key(tracks: TrackStack, start: float) -> TrackStack:
+def _single_key(tracks: StackedTracks, start: float) -> StackedTracks:
     values = sample(tracks, np.array([start]))
     linear = Interpolation.LINEAR if tracks.interpolation is Interpolation.CUBICSPLINE else tracks.interpolation
     return tracks.with_keys([start], values, interpolation=linear)

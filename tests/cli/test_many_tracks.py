@@ -11,10 +11,12 @@ from anim.exchange.euler import curve
 from anim.maths import quaternion
 from anim.measure.continuous_bound import interval_rise
 from anim.measure.error.metric import ErrorMetric
+from anim.operations import ease
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
 from tests.cli.running import refusal
+from tests.files import clips_of
 
 NODES = 300
 MAX_CALLS = 100  # of a function on quaternions, in one command
@@ -90,3 +92,15 @@ def test_sticks_for_too_many_nodes_are_refused_before_they_are_made(
     assert not made
     call(*line, "1GB").product()
     assert made
+
+
+def test_tracks_that_are_equal_but_for_their_node_are_eased_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = count_calls(monkeypatch, ease, "ease_segments")
+    (tmp_path / "in.glb").write_bytes(many.side_moving(20))
+    call("ease", tmp_path / "in.glb", tmp_path / "out.glb").product()
+    assert len(counted) == 1
+    tracks = clips_of((tmp_path / "out.glb").read_bytes())[0].tracks
+    assert [track.node for track in tracks] == list(range(20))
+    assert all((track.values == tracks[0].values).all() for track in tracks)

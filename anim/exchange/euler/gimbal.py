@@ -16,6 +16,7 @@ from anim.maths.euler import ORDERS, AxesConvention
 from anim.model import Clip, Interpolation, Track
 from anim.sampling.track_stack import TrackStack
 
+COSINE_ROUNDING = 1e-12  # of `gimbal_cosine`, far above its rounding
 NEAR_LOCK_RAD = np.radians(5.0)  # from lock: rates are amplified 23 times there
 SUFFICIENT_KEYS, SAMPLES_PER_INTERVAL = 500, 29  # sufficient keys; samples per interval with fewer keys
 ANGLE_TOLERANCE_RAD = 1e-9  # rad; smaller differences are ignored: the first counts
@@ -57,9 +58,9 @@ def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
         nodes = [motion.nodes[track.node] for track in tracks if track.node is not None]
         samples = _samples(tracks)
         turns = _without_pivots([node.pivots for node in nodes], samples)
-        by_order = {order: euler.gimbal_distance(turns, order=order) for order in ORDERS if order not in SAME_DISTANCE}
+        by_order = {order: _nearest(samples, turns, order) for order in ORDERS if order not in SAME_DISTANCE}
         by_order |= {order: by_order[other] for order, other in SAME_DISTANCE.items()}
-        found = _rows(nodes, samples, np.stack([by_order[order] for order in ORDERS]))
+        found = _rows(nodes, samples, turns, np.stack([by_order[order] for order in ORDERS]))
         rows += zip((track.node or 0 for track in tracks), found, strict=True)
     return tuple(row for _, row in sorted(rows, key=lambda each: each[0]))
 
@@ -124,15 +125,32 @@ def _without_pivots(pivots: Sequence[Pivots], samples: _Samples) -> Floats:
     return turns
 
 
-def _rows(nodes: Sequence[EulerNode], samples: _Samples, distances: Floats) -> Iterator[GimbalStats]:
-    """Yield the statistics of nodes; distances: (12, S) of their samples, by order."""
+def _nearest(samples: _Samples, turns: Floats, order: str) -> Floats:
+    """The least distance (G,) of each track's rotations (S, 4): of those with the largest cosine, but for rounding."""
+    cosine = euler.gimbal_cosine(turns, order=order)
+    top = np.maximum.reduceat(cosine, samples.starts)
+    some = np.flatnonzero(cosine >= top[samples.track] - COSINE_ROUNDING)
+    distances = euler.gimbal_distance(turns[some], order=order)
+    return np.minimum.reduceat(distances, np.searchsorted(some, samples.starts))
+
+
+def _own_distances(samples: _Samples, turns: Floats, order: Ints) -> Floats:
+    """Distances (S,) of all rotations, by the order (G,) of each track."""
+    found = np.empty(len(turns))
+    for number in sorted(set(order.tolist())):
+        mine = (order == number)[samples.track]
+        found[mine] = euler.gimbal_distance(turns[mine], order=ORDERS[number])
+    return found
+
+
+def _rows(nodes: Sequence[EulerNode], samples: _Samples, turns: Floats, nearest: Floats) -> Iterator[GimbalStats]:
+    """Yield the statistics of nodes with rotations (S, 4); nearest: (12, G) least distances by order."""
     intrinsic = [n.order if n.frame == AxesConvention.INTRINSIC else n.order[::-1] for n in nodes]
     order = np.array([ORDERS.index(each) for each in intrinsic])
-    nearest = np.minimum.reduceat(distances, samples.starts, axis=1)
     usual = nearest[order, np.arange(len(nodes))]
     best = np.where(nearest.max(axis=0) <= usual + ANGLE_TOLERANCE_RAD, order, nearest.argmax(axis=0))
     margin = np.degrees(nearest[best, np.arange(len(nodes))])
-    own = distances[order[samples.track], np.arange(len(samples.track))]
+    own = _own_distances(samples, turns, order)
     close = np.flatnonzero(own <= usual[samples.track] + ANGLE_TOLERANCE_RAD)
     least = close[np.searchsorted(close, samples.starts)]  # the first of each track
     sine = np.minimum(np.cos(own[least]), 1 - 1e-12)

@@ -112,6 +112,13 @@ def test_distance_to_lock_is_that_of_the_middle_angle(order: str) -> None:
     np.testing.assert_allclose(np.sin(euler.gimbal_distance(q, order=order)), np.abs(sine), atol=1e-9)
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_cosine_of_the_distance_to_lock(order: str) -> None:
+    q = quaternion.normalize(np.random.default_rng(5).normal(size=(1000, 4)))
+    distance = euler.gimbal_distance(q, order=order)
+    np.testing.assert_allclose(euler.gimbal_cosine(q, order=order), np.cos(distance), atol=1e-14)
+
+
 def test_fewer_axes_are_fewer_turns() -> None:
     np.testing.assert_allclose(euler.to_quaternion(np.array([np.pi]), order="Y"), (0, 1, 0, 0), atol=1e-15)
     np.testing.assert_array_equal(euler.to_quaternion(np.zeros((2, 0)), order=""), [[0, 0, 0, 1]] * 2)

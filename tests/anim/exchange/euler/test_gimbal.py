@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anim.arrays import Floats
+from anim.exchange.euler import gimbal
 from anim.exchange.euler.curve import linear
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.gimbal import GimbalStats, gimbal_stats
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode, Pivots
-from anim.maths import quaternion
+from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, AxesConvention, is_proper
 
 TIMES = np.arange(181) / 60
@@ -90,3 +92,24 @@ def test_the_first_of_equal_times_counts() -> None:
     """A turn about one axis is a quarter from lock all the time, to within rounding."""
     turns = quaternion.normalize(np.random.default_rng(4).normal(size=(2, 4)))
     assert _row((720, 0, 0), "ZXY", pivots=Pivots(*turns)).at_s == 0
+
+
+def test_distances_of_other_orders_are_computed_where_they_may_be_least(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The least ones are those of all rotations, bit for bit, from few of them."""
+    sizes: list[int] = []
+
+    def counted(q: Floats, *, order: str) -> Floats:
+        sizes.append(len(q))
+        return distance(q, order=order)
+
+    distance = euler.gimbal_distance
+    random = np.random.default_rng(4)
+    curves = tuple(linear(TIMES, random.normal(0, 2, len(TIMES))) for _ in range(3))
+    node = EulerNode("a", -1, np.zeros(3), "ZXY", AxesConvention.INTRINSIC, np.zeros(3), curves)
+    motion = EulerMotion((node,))
+    clip = from_euler(motion, tolerance=1e-3).clip
+    monkeypatch.setattr(euler, "gimbal_distance", counted)
+    row = gimbal_stats(motion, clip)[0]
+    assert sorted(sizes)[-2] < max(sizes) / 100
+    monkeypatch.setattr(gimbal, "COSINE_ROUNDING", 2.0)  # all rotations
+    assert gimbal_stats(motion, clip)[0] == row

@@ -17,7 +17,7 @@ MAX_VALUES = 1 << 18  # keys × components of tracks changed together: of long o
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TrackStack:
+class StackedTracks:
     """G tracks of one path, interpolation and kind on one time axis, or what becomes of them.
 
     values: (K, G, C). in_tangents, out_tangents: (K, G, C) per second, for CUBICSPLINE only.
@@ -48,12 +48,12 @@ class TrackStack:
         out_tangents: Floats | None = None,
         *,
         interpolation: Interpolation | None = None,
-    ) -> TrackStack:
+    ) -> StackedTracks:
         """Return the stack with other keys, and with another interpolation if given."""
         axis = times if isinstance(times, TimeAxis) else TimeAxis(times)
-        return TrackStack(self.tracks, interpolation or self.interpolation, axis, values, in_tangents, out_tangents)
+        return StackedTracks(self.tracks, interpolation or self.interpolation, axis, values, in_tangents, out_tangents)
 
-    def pick(self, chosen: Bools) -> TrackStack:
+    def pick(self, chosen: Bools) -> StackedTracks:
         """Return the stack of the chosen tracks (G,)."""
         if chosen.all():
             return self
@@ -73,7 +73,7 @@ class TrackStack:
         ]
 
 
-def change_tracks(clip: Clip, chosen: frozenset[int], change: Callable[[TrackStack], Sequence[Track]]) -> Clip:
+def change_tracks(clip: Clip, chosen: frozenset[int], change: Callable[[StackedTracks], Sequence[Track]]) -> Clip:
     """Return the clip with some tracks, by index, replaced by those that `change` makes of each stack, in its order."""
     numbers = sorted(chosen)
     new = list(clip.tracks)
@@ -86,9 +86,9 @@ def change_tracks(clip: Clip, chosen: frozenset[int], change: Callable[[TrackSta
     return Clip(clip.name, tuple(new))
 
 
-def _stack(tracks: tuple[Track, ...]) -> TrackStack:
+def _stack(tracks: tuple[Track, ...]) -> StackedTracks:
     batch = batches(tracks)[0]
-    return TrackStack(tracks, batch.interpolation, batch.time_axis, batch.values, *(batch.tangents or ()))
+    return StackedTracks(tracks, batch.interpolation, batch.time_axis, batch.values, *(batch.tangents or ()))
 
 
 def _by_track(values: Floats | None, count: int) -> Sequence[Any]:
