@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import accumulate
 
 import numpy as np
 
@@ -21,8 +23,10 @@ from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
 from anim.skinning.methods.registry import SKINNING_METHODS
 from anim.skinning.methods.skinner import Skinner
+from anim.skinning.small_meshes import NO_NODE, merge_small
 
 SPACES = ("world", "mesh")
+REVERSED = [0, 2, 1]  # corners of a face with the other winding
 
 
 def bake(
@@ -90,20 +94,24 @@ def prepare_bake(
     chosen = bakeable_instances(scene, rigid=rigid, nodes=nodes)
     if not chosen:
         raise NotFoundError("there is no mesh with a skin or morph targets to bake", help=_hint(scene, rigid=rigid))
-    starts = np.cumsum([0, *(len(instance.mesh.positions) for instance in chosen)])
-    make = _maker(method, blend, bulge_clamp=bulge_clamp)
     rest = PosedSkeleton.at_rest(scene.skeleton)
-    layers = tuple(
-        bind_mesh(rest, scene.skeleton, instance, make, at=at, space=space, normals=normals, tangents=tangents)
-        for instance, at in zip(chosen, starts.tolist(), strict=False)
-    )
+    bind = partial(bind_mesh, scene.skeleton, space=space, normals=normals, tangents=tangents)
+    make = _maker(method, blend, bulge_clamp=bulge_clamp)
+    if space == "mesh":  # each in the space of its own node
+        merged: Sequence[MeshInstance] = chosen
+    else:
+        chosen = _wound_as_shown(chosen, rest)
+        merged = merge_small(chosen, scene.skeleton, skinned=method == "lbs")
+    bound = _bind_all(bind, merged, make)
     return Baker(
         scene,
-        layers,
-        int(starts[-1]),
-        np.concatenate([each.rig.faces + each.at for each in layers]),
-        tuple(_parts(scene, layers)),
-        np.concatenate([each.at_rest(rest) for each in layers]),
+        tuple(chosen),
+        bound,
+        lambda: bound if len(bound) == len(chosen) else _bind_all(bind, chosen, make),
+        sum(len(each.rig.points) for each in bound),
+        np.concatenate([each.rig.faces + each.at for each in bound]),
+        tuple(_parts(scene, chosen)),
+        np.concatenate([each.at_rest(rest) for each in bound]),
         normals,
         _handedness(chosen) if tangents else None,
         threads or _cpu_count(),
@@ -114,13 +122,16 @@ def prepare_bake(
 class Baker:
     """Meshes of a scene, ready to be baked with any clip.
 
-    layers: in the order of their vertices; `vertices` is the total number. faces: (T, 3) of all of them.
+    instances: in the order of their vertices, of which `vertices` is the number. bound: the same, small ones as one.
+    bind_each: returns the layer of each instance. faces: (T, 3) of all of them.
     rest: (V, 3) m, vertices in the scene's rest pose. normals: whether they are baked too. handedness: (V,)
     of tangents, None without them.
     """
 
     scene: Scene
-    layers: tuple[BoundMesh, ...]
+    instances: tuple[MeshInstance, ...]
+    bound: tuple[BoundMesh, ...]
+    bind_each: Callable[[], tuple[BoundMesh, ...]]
     vertices: int
     faces: Ints
     parts: tuple[MeshPart, ...]
@@ -139,7 +150,7 @@ class Baker:
         check_type(clip, Clip, "clip")
         seconds = arrays.as_key_times(times)
         wanted = (self.normals, self.handedness is not None)
-        stream = ChunkPipeline(self.scene.skeleton, self.layers, self.vertices, *wanted, self.threads)
+        stream = ChunkPipeline(self.scene.skeleton, self.bound, self.vertices, *wanted, self.threads)
         return VertexCache(
             seconds,
             self.vertices,
@@ -229,16 +240,35 @@ def _hint(scene: Scene, *, rigid: bool) -> str:
     return "" if rigid else "unskinned meshes are baked with `rigid`"
 
 
-def _parts(scene: Scene, layers: Sequence[BoundMesh]) -> Iterator[MeshPart]:
-    face = 0
-    for each in layers:
-        mesh, vertex = each.instance.mesh, each.at
-        name = mesh.name or scene.skeleton.names[each.instance.node]
+def _bind_all(bind: Callable[..., BoundMesh], instances: Sequence[MeshInstance], make: Make) -> tuple[BoundMesh, ...]:
+    starts = accumulate((len(each.mesh.positions) for each in instances), initial=0)
+    linear = LinearBlend  # of several meshes, as they are all blended so
+    return tuple(
+        bind(each, linear if each.node == NO_NODE else make, at) for each, at in zip(instances, starts, strict=False)
+    )
+
+
+def _wound_as_shown(instances: Sequence[MeshInstance], rest: PosedSkeleton) -> list[MeshInstance]:
+    """The instances, with reversed faces where the node mirrors them at rest: players do so."""
+    mirrored = np.linalg.det(rest.world[[each.node for each in instances], 0, :, :3]) < 0
+    return [
+        replace(each, mesh=replace(each.mesh, faces=np.ascontiguousarray(each.mesh.faces[:, REVERSED])))
+        if is_mirrored
+        else each
+        for each, is_mirrored in zip(instances, mirrored.tolist(), strict=True)
+    ]
+
+
+def _parts(scene: Scene, instances: Sequence[MeshInstance]) -> Iterator[MeshPart]:
+    vertex = face = 0
+    for each in instances:
+        mesh = each.mesh
+        name = mesh.name or scene.skeleton.names[each.node]
         primitives = mesh.primitives or (PrimitiveRange(len(mesh.positions), len(mesh.faces)),)
         for primitive in primitives:
             ends = vertex + primitive.vertices, face + primitive.faces
             if primitive.vertices:
-                yield MeshPart(name, (vertex, ends[0]), (face, ends[1]), each.instance.node, primitive.material)
+                yield MeshPart(name, (vertex, ends[0]), (face, ends[1]), each.node, primitive.material)
             vertex, face = ends
 
 

@@ -53,7 +53,7 @@ def bind_skin(instance: MeshInstance, parents: Ints, *, normals: bool = False, t
         joints, weights = np.zeros((len(mesh.positions), 1), np.int64), np.ones((len(mesh.positions), 1))
     else:
         nodes, bind, joints, weights = skin.joints, skin.inverse_bind, mesh.joints, mesh.weights
-        _check(joints, weights, len(nodes))
+        check_influences(joints, weights, len(nodes))
     start, joint, weight = influences(joints, weights)
     none = np.empty((0, 3))
     turned = mesh.normals if normals and mesh.normals is not None else none
@@ -107,7 +107,8 @@ def ancestor_joints(nodes: Ints, parents: Ints) -> Ints:
     return np.array(found, np.int64)
 
 
-def _check(joints: Ints, weights: Floats, count: int) -> None:
+def check_influences(joints: Ints, weights: Floats, count: int) -> None:
+    """Raise RangeError for a weight that is no number, or a joint that is not among `count`."""
     if not np.isfinite(weights).all():
         raise RangeError(f"vertex {int(np.argwhere(~np.isfinite(weights))[0][0])} has a skin weight that is no number")
     outside = (joints < 0) | (joints >= count)

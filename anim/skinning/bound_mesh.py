@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,7 +19,6 @@ from anim.skinning.methods.skinner import Skinner, fill_lanes
 from anim.skinning.vertex_normals import SmoothNormals
 
 Make: TypeAlias = Callable[[SkinBinding, bool], Skinner]
-REVERSED = [0, 2, 1]  # corners of a face with the other winding
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,17 +110,16 @@ class BoundMesh:
 
 
 def bind_mesh(
-    rest: PosedSkeleton,
     skeleton: Skeleton,
     instance: MeshInstance,
     make: Make,
-    *,
     at: int,
+    *,
     space: str,
     normals: bool,
     tangents: bool,
 ) -> BoundMesh:
-    """Return the layer of an instance; in world space with faces reversed if its node mirrors them at rest.
+    """Return the layer of an instance. at: its first column.
 
     make: called with its rig, and whether its points are constant and need no directions.
     """
@@ -130,8 +128,6 @@ def bind_mesh(
         bound = bind_skin(instance, skeleton.parents, normals=normals, tangents=tangents)
     except AnimError as error:
         raise error.at(f"mesh '{name}'") from None
-    if space != "mesh" and np.linalg.det(rest.world[instance.node, 0, :, :3]) < 0:  # players reverse them by the node
-        bound = replace(bound, faces=np.ascontiguousarray(bound.faces[:, REVERSED]))
     smooth = SmoothNormals(bound.faces, len(bound.points)) if normals and instance.mesh.normals is None else None
     plain = not len(instance.mesh.targets) and not len(bound.normals) and not len(bound.tangents)
     static_block = VertexBlock(*(_rows(part[:, :, None]) for part in (bound.points, bound.normals, bound.tangents)))

@@ -21,7 +21,7 @@ class UnevenScale:
 
     def __init__(self, made: Baker) -> None:
         self._skeleton = made.scene.skeleton
-        self._meshes = [_WeightedMesh(layer) for layer in made.layers]
+        self._meshes = [_WeightedMesh(layer) for layer in made.bind_each()]
 
     def joints(self, clip: Clip, times: Floats) -> tuple[int, ...]:
         """Return the joints with weight that scale unevenly, or shear, at any of `times` (F,) s, increasing.

@@ -166,6 +166,7 @@ def command(
                 numbers,
                 [str(each) for each in method or ()],
                 when,
+                scene=scene,
                 nodes=nodes,
                 textures=not (heat or checker or wire) if textures is None else textures,
                 resolve=beside,

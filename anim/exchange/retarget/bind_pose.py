@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -38,9 +39,8 @@ def bind_pose(skeleton: Skeleton, skins: Sequence[tuple[int, Skin]]) -> BindPose
     for holder, skin in skins:
         for node, place in _bind_matrices(skeleton, world, (holder, skin), bound).items():
             bound.setdefault(node, place)
-    if not any(_differs(bound[node], world[node], _size(world, bound)) for node in bound):
-        return BindPose(skeleton, 0)
-    return _set_rest(skeleton, world, bound)
+    moved = _count_moved(world, bound)
+    return BindPose(_set_rest(skeleton, world, bound), moved) if moved else BindPose(skeleton, 0)
 
 
 def fill_from_parents(clip: Clip, skeleton: Skeleton, other: Skeleton) -> Clip:
@@ -94,27 +94,27 @@ def _world_from_mesh(
     return np.asarray(choices[int(np.argmin(far))])
 
 
-def _differs(bound: Floats, world: Floats, size: float) -> bool:
-    far = float(np.linalg.norm(bound[:, 3] - world[:, 3])) > MIN_OFFSET_FRACTION * size
-    one, two = (matrix.decompose(each)[1] for each in (bound, world))
-    return far or bool(quaternion.angle_between(one, two) > MIN_ANGLE_RAD)
+def _count_moved(world: Floats, bound: dict[int, Floats]) -> int:
+    """Count of joints that rest elsewhere than they were bound."""
+    if not bound:
+        return 0
+    there, here = np.stack([*bound.values()]), world[[*bound]]
+    size = float(np.ptp(here[:, :, 3], axis=0).max())
+    far = np.linalg.norm(there[:, :, 3] - here[:, :, 3], axis=1) > MIN_OFFSET_FRACTION * size
+    one, two = (matrix.decompose(each)[1] for each in (there, here))
+    return int((far | (quaternion.angle_between(one, two) > MIN_ANGLE_RAD)).sum())
 
 
-def _size(world: Floats, joints: dict[int, Floats]) -> float:
-    return float(np.ptp(world[[*joints], :, 3], axis=0).max())
-
-
-def _set_rest(skeleton: Skeleton, world: Floats, bound: dict[int, Floats]) -> BindPose:
-    """The skeleton with joints in the bind pose, and the count of moved joints."""
+def _set_rest(skeleton: Skeleton, world: Floats, bound: dict[int, Floats]) -> Skeleton:
+    """The skeleton with joints in the bind pose."""
     parts = {path: getattr(skeleton, path).copy() for path in ("translation", "rotation", "scale")}
-    found, size = world.copy(), _size(world, bound)
-    for level in skeleton.levels():
-        for node in level.tolist():
-            parent = int(skeleton.parents[node])
-            local = world[node] if parent < 0 else matrix.multiply(matrix.inverse(world[parent]), world[node])
-            if node in bound:
-                local = bound[node] if parent < 0 else matrix.multiply(matrix.inverse(found[parent]), bound[node])
-                for path, value in zip(parts, matrix.decompose(local)[:3], strict=True):
-                    parts[path][node] = value
-            found[node] = local if parent < 0 else matrix.multiply(found[parent], local)
-    return BindPose(replace(skeleton, **parts), sum(_differs(bound[n], world[n], size) for n in bound))
+    found, parents = world.copy(), skeleton.parents.tolist()
+    for node in itertools.chain.from_iterable(level.tolist() for level in skeleton.levels()):
+        parent = parents[node]
+        goal, above = (bound[node], found) if node in bound else (world[node], world)
+        local = goal if parent < 0 else matrix.multiply(matrix.inverse(above[parent]), goal)
+        if node in bound:
+            for path, value in zip(parts, matrix.decompose(local)[:3], strict=True):
+                parts[path][node] = value
+        found[node] = local if parent < 0 else matrix.multiply(found[parent], local)
+    return replace(skeleton, **parts)

@@ -38,10 +38,11 @@ def stage_error(
     code_of = dict(zip(times.tolist(), codes, strict=True))
     rate, most = float(stage.GetTimeCodesPerSecond()), StageError(0.0, float(times[0]))
     points = StagePoints(stage)
+    layers = baker.bind_each()
     for chunk in baker.bake(clip, times=measured).chunks():
         for i, expected in enumerate(chunk.positions):
             time = float(measured[chunk.first + i])
-            for layer in baker.layers:
+            for layer in layers:
                 found = points.at(prims[layer.instance.node], code_of.get(time, time * rate))
                 most = max(most, StageError(_distance(found, expected, layer), time))
     return most

@@ -23,7 +23,7 @@ from anim.show.filmstrip.filmstrip import MAX_POINTS, Extent, Strip
 from anim.show.filmstrip.ground import ground_height
 from anim.show.filmstrip.materials import MaterialReader
 from anim.show.filmstrip.surface import Surface
-from anim.skinning.bake import bake
+from anim.skinning.bake import Baker, prepare_bake
 from anim.skinning.methods.registry import SKINNING_METHODS
 
 MAX_LOADED_BYTES = 48_000_000  # positions of frames that are baked once for all uses: of MAX_FRAMING_VERTICES
@@ -105,6 +105,7 @@ def of_document(
     methods: Sequence[str],
     when: FrameSelection,
     *,
+    scene: Scene | None = None,
     nodes: Collection[int] | None = None,
     textures: bool = True,
     resolve: Resolve | None = None,
@@ -112,7 +113,8 @@ def of_document(
 ) -> list[FilmstripClip]:
     """Return the motion of each clip index and skinning method; without clips the rest pose.
 
-    nodes: only meshes on these; None for all. A file without a mesh is shown as sticks from joint to joint.
+    scene: the document's, if the caller has it. nodes: only meshes on these; None for all. A file without a mesh is
+    shown as sticks from joint to joint.
     textures: show base color textures, vertex colors and alpha. resolve: gives the bytes of a companion file by its
     relative path, for images; None for input without a folder. note: called with notes on unsupported content.
     Raises NotFoundError for a file without meshes and joints.
@@ -120,7 +122,7 @@ def of_document(
     for name in methods:
         if name not in SKINNING_METHODS:
             raise RangeError(f"`method` is '{name}' (expected {', '.join(SKINNING_METHODS)})")
-    whole_scene = reader.scene(document)
+    whole_scene = scene or reader.scene(document)
     scene = _visible(whole_scene, nodes)
     is_drawn = any(len(instance.mesh.faces) for instance in whole_scene.instances)
     materials = MaterialReader(document, resolve, note) if textures and is_drawn else None
@@ -131,14 +133,17 @@ def of_document(
     colors: Floats = np.empty((0, 3))
     when.check(min((clip.start for clip in moving), default=0.0), max((clip.end for clip in moving), default=0.0))
     found: list[FilmstripClip] = []
+    bakers: dict[str, Baker] = {}
     for number, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
         times, path = when.times(start, end), _framing_times(start, end, sum(map(_num_vertices, scene.instances)))
         if not len(times):
             continue
         for method in methods or ("lbs",):
-            cache = _load_small(bake(scene, clip, times=times, method=method, rigid=True))
-            whole = _load_small(bake(scene, clip, times=path, method=method, rigid=True))
+            if method not in bakers:
+                bakers[method] = prepare_bake(scene, method=method, rigid=True)
+            cache = _load_small(bakers[method].bake(clip, times=times))
+            whole = _load_small(bakers[method].bake(clip, times=path))
             if not found and materials is not None:
                 surface, colors = materials.surface(cache)
             elif not found:

@@ -34,21 +34,24 @@ class MaterialReader:
         self._images: dict[object, Texels | None] = {}
         self._pixels = PixelBudget()
         self._read: dict[str, VertexColors] = {}
+        self._coatings: dict[tuple[int, bool], Coating] = {}
 
     def surface(self, cache: VertexCache) -> tuple[Surface, Floats]:
         """Return the materials on a cache of the document, and the base colors (T, 3) multiplied by them."""
         texcoords, colors = np.zeros((cache.vertex_count, 2)), np.ones((cache.vertex_count, 4))
         coating = np.zeros(len(cache.faces), np.int64)
-        coatings: list[Coating] = []
+        coatings: dict[Coating, int] = {}
         painted: set[int] = set()
         for i, (part, found) in enumerate(self._primitives(cache)):
             vertices = slice(*part.vertices)
             texcoords[vertices], colors[vertices] = found.texcoords, found.colors
-            made = self._coating(self._material(part.material), textured=found.has_texcoords)
+            key = (part.material, found.has_texcoords)
+            if key not in self._coatings:
+                self._coatings[key] = self._coating(self._material(part.material), textured=found.has_texcoords)
+            made = self._coatings[key]
             if made.texture is not None or found.has_colors:
                 painted.add(i)
-            coating[slice(*part.faces)] = len(coatings)
-            coatings.append(made)
+            coating[slice(*part.faces)] = coatings.setdefault(made, len(coatings))
         factors = [material.factor[:3] for material in self._materials]
         has_colors = bool((colors != 1).any())
         surface = Surface(cache.faces, coating, tuple(coatings), texcoords, colors if has_colors else None)

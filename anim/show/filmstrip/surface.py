@@ -91,11 +91,13 @@ class Surface:
             if texture is not None:
                 places = np.einsum("sc,sci->si", shares[chosen], self.texcoords[vertices[chosen]].astype(np.float64))
                 result[chosen] *= texture.sample(places)
-            result[chosen, 3] *= self.coatings[i].alpha
+        result[:, 3] *= np.array([each.alpha for each in self.coatings])[coating]
         return result
 
 
 def _groups(indices: Ints) -> Iterator[tuple[int, Ints]]:
     """Yield each distinct index with its positions."""
-    for i in np.unique(indices).tolist():
-        yield i, np.flatnonzero(indices == i)
+    order = np.argsort(indices, kind="stable")
+    starts = np.flatnonzero(np.diff(indices[order], prepend=-1))
+    for places in np.split(order, starts[1:]) if len(order) else ():
+        yield int(indices[places[0]]), places

@@ -32,7 +32,7 @@ GRAY_16 = 65535  # largest gray level of 16-bit PNG
 Texels = NDArray[np.uint8]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TextureSampler:
     """Texels (H, W, 4) as stored, RGB in sRGB. wrap: modes along u and v. nearest: no interpolation."""
 

@@ -52,8 +52,8 @@ class InbetweenMetric:
 
     def __init__(self, baker: Baker) -> None:
         self._baker = baker
-        nodes = frozenset(each.instance.node for each in baker.layers)
-        space = "mesh" if baker.layers[0].in_mesh_space else "world"
+        nodes = frozenset(each.node for each in baker.instances)
+        space = "mesh" if baker.bound[0].in_mesh_space else "world"
         self._reduced = prepare_bake(reduce_scene(baker.scene, nodes), space=space, rigid=True, threads=baker.threads)
 
     def largest_error(self, clip: Clip, times: Floats) -> InbetweenError:

@@ -26,7 +26,7 @@ class Deviation(NamedTuple):
 
 def linear_baker(made: Baker, *, space: str) -> Baker:
     """Return a baker of the same meshes by linear blending, positions only. space: that of `made`."""
-    nodes = sorted({layer.instance.node for layer in made.layers})
+    nodes = sorted({each.node for each in made.instances})
     return prepare_bake(made.scene, space=space, rigid=True, nodes=nodes, threads=made.threads)
 
 

@@ -47,7 +47,7 @@ def _compared(of: Scene, clips: Sequence[Clip], method: str) -> int:
         whole = made.bake(played, times=times).load_all().positions
         local = sample_pose(of.skeleton, played, times)
         frames = PosedSkeleton(of.skeleton, local)
-        for layer in made.layers:
+        for layer in made.bind_each():
             if layer.instance.skin is None:
                 continue
             found = whole[:, layer.at : layer.at + len(layer.rig.points)]

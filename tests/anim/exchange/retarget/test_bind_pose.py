@@ -18,8 +18,10 @@ from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.model import Pose, Scene, Skeleton, Skin
 from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
+from tests import many
 from tests.anim.exchange.figures import Find, character, recorded
-from tests.files import mark_slow
+from tests.calls import count_calls
+from tests.files import mark_slow, opened
 
 Skins: TypeAlias = list[tuple[int, Skin]]
 Rig: TypeAlias = tuple[Skeleton, Skins]
@@ -180,3 +182,11 @@ def test_a_recording_moves_them_alike(build: Callable[[Rig], Rig], asset: Find) 
         for each, clip in ((bones, clean), (dancing, other))
     )
     np.testing.assert_allclose(two, one, atol=1e-4)
+
+
+def test_joints_are_compared_in_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = opened(many.joints(20))
+    counted = count_calls(monkeypatch, matrix, "decompose")
+    found = bind_pose(reader.skeleton(document), reader.skins(document))
+    assert found.num_joints > 0
+    assert len(counted) == 20 + 2

@@ -52,7 +52,7 @@ def largest_error(path: Path, scene: Scene, clip: Clip, result: UsdSkelResult, f
     whole, worst = baker.bake(clip, times=times).load_all().positions, 0.0
     for code, expected in zip(codes, whole, strict=True):
         found = world_points(stage, code)
-        for layer in baker.layers:
+        for layer in baker.bind_each():
             rows = found[result.paths[layer.instance.node]]
             worst = max(worst, float(np.abs(rows - expected[layer.at : layer.at + len(rows)]).max()))
     return worst / diagonal(scene)
