@@ -16,9 +16,11 @@ from anim.errors import AnimError, NotFoundError, RangeError, ShapeError, Unsupp
 from anim.gltf.document import Buffer, Document
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.writing import writer
+from anim.gltf.writing import encoding, writer
 from anim.model import AccessorFormat, Clip, Track
+from anim.operations.resample import resample
 from fixtures.broken.pieces import animated, text
+from tests import many
 from tests.anim.gltf.writing.documents import check_same, rewritten
 from tests.clips import CUBICSPLINE, STEP, track
 from tests.files import glb_of, opened, opened_fixture
@@ -288,3 +290,19 @@ def test_clips_are_asked_for_by_whole_numbers() -> None:
         writer.replace_clips(document, {True: clip})
     with pytest.raises(ShapeError, match="a clip is None"):
         writer.replace_clips(document, {0: None})  # type: ignore[dict-item]
+
+
+def test_equal_tracks_are_encoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = opened(many.channels(50))
+    clips = {i: resample(clip, fps=4) for i, clip in enumerate(reader.clips(document))}
+    encoded: list[Track] = []
+
+    def values(track: Track) -> encoding.AccessorData:
+        encoded.append(track)
+        return encode(track)
+
+    encode = encoding.values
+    monkeypatch.setattr(encoding, "values", values)
+    after = reader.clips(writer.replace_clips(document, clips))
+    assert len(encoded) == 10  # one for each node
+    assert [len(clip.key_times) for clip in after] == [5] * 5
