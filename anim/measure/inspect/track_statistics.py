@@ -23,6 +23,7 @@ MAX_INTEGERS = {
     5122: 32767,
     5123: 65535,
 }  # integer for 1.0 by component type, of normalized integers
+BLOCK_KEYS = 100_000  # that are compared with their neighbors at once, each about 200 bytes
 WIDE_STEP_RAD = np.radians(170.0)  # rad; from here on players disagree on the shorter arc
 
 
@@ -164,20 +165,23 @@ def _redundant(group: ConcatenatedTracks, values: Floats, constant: Bools) -> Bo
     of_track = np.repeat(np.arange(len(constant)), group.counts)
     inner = ~constant[of_track]
     inner[group.starts] = inner[group.starts + group.counts - 1] = False
-    at = np.flatnonzero(inner)
-    inner[at] = _is_interpolated(group, values, of_track, at)
+    least, most = _extent(group, values)
+    allowed = KEY_TOLERANCE_PER_RANGE * (most - least).max(axis=1) + FLOAT32_TOLERANCE * _sizes(least, most)
+    chosen = np.flatnonzero(inner)
+    for start in range(0, len(chosen), BLOCK_KEYS):
+        at = chosen[start : start + BLOCK_KEYS]
+        inner[at] = _is_interpolated(group, values, of_track, at, allowed[of_track[at]])
     return np.asarray(inner)
 
 
-def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints) -> Bools:
-    """Mask (A,) of the inner keys at indices `at` (A,) that are interpolated by their neighbors."""
+def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints, allowed: Floats) -> Bools:
+    """Mask (A,) of the inner keys at indices `at` (A,) that are interpolated by their neighbors.
+
+    allowed: (A,) largest difference.
+    """
     before, here, after = values[at - 1], values[at], values[at + 1]
     if group.interpolation is Interpolation.STEP:
         return np.asarray(_widest(here - before) == 0)
-    least, most = _extent(group, values)
-    allowed = (KEY_TOLERANCE_PER_RANGE * (most - least).max(axis=1) + FLOAT32_TOLERANCE * _sizes(least, most))[
-        of_track[at]
-    ]
     duration = group.times[at + 1] - group.times[at - 1]
     u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
