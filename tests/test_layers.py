@@ -86,7 +86,7 @@ PUBLIC = {
     "gltf.reading": "accessors materials meshes reader vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets hierarchy rules schema",
     "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
-    "measure.compare": "diff name_matching vertex_distance",
+    "measure.compare": "diff equal_scenes name_matching vertex_distance",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "clip_groups largest_error prover",
     "measure.error": "error_curve metric point_matrix sample_times shell_points statistics surface",

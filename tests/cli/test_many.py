@@ -92,7 +92,7 @@ def test_a_chain_of_nodes(line: list[str], call: Call, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    [["diff", "IN"], ["resample", "OUT", "--fps", "5"], ["spline", "OUT", "--tangents", "catmull-rom"]],
+    [["diff", "OTHER"], ["resample", "OUT", "--fps", "5"], ["spline", "OUT", "--tangents", "catmull-rom"]],
     ids=lambda line: line[0],
 )
 def test_equal_clips_are_measured_once(
@@ -100,7 +100,8 @@ def test_equal_clips_are_measured_once(
 ) -> None:
     path = tmp_path / "in.gltf"
     path.write_bytes(equal_clips(CLIPS))
-    names = {"OUT": str(tmp_path / "out.glb"), "IN": str(path)}
+    names = {"OUT": str(tmp_path / "out.glb"), "OTHER": str(tmp_path / "other.glb")}
+    call("resample", path, names["OTHER"], "--fps", "7").product()
     counted = count_calls(monkeypatch, Prover, "certified")
     call(line[0], path, *(names.get(each, each) for each in line[1:])).product()
     assert len(counted) == 1
@@ -236,9 +237,10 @@ def test_static_nodes_are_measured_as_one(call: Call, tmp_path: Path, monkeypatc
     accumulate = hierarchy.accumulate
     monkeypatch.setattr(hierarchy, "accumulate", called)
     for make in (many.chain, many.side_meshes):
-        sizes.clear()
         (tmp_path / "in.glb").write_bytes(make(3000))
-        call("diff", tmp_path / "in.glb", tmp_path / "in.glb").product()
+        call("resample", tmp_path / "in.glb", tmp_path / "other.glb", "--fps", "3").product()
+        sizes.clear()
+        call("diff", tmp_path / "in.glb", tmp_path / "other.glb").product()
         assert max(sizes) <= 3000
         assert sum(sizes) < 20 * 3000
 

@@ -53,6 +53,15 @@ def test_equal_clips_are_not_sampled(call: Call, tmp_path: Path, monkeypatch: py
     assert counted
 
 
+def test_a_clip_that_optimize_leaves_is_not_sampled(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = count_calls(monkeypatch, ErrorMetric, "sample_errors")
+    (tmp_path / "in.glb").write_bytes(many.side_moving(20))
+    call("optimize", tmp_path / "in.glb", tmp_path / "out.glb").product()
+    assert not counted
+
+
 def test_tracks_are_sorted_once_for_all_steps_of_a_proof(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,7 @@ from anim.errors import AnimError
 from anim.gltf.reading.reader import clip_label
 from anim.measure.compare import name_matching
 from anim.measure.compare.correspondence import Correspondence
-from anim.measure.compare.equal_scenes import are_equal
+from anim.measure.compare.equal_scenes import are_equal, no_error
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.equal_clips import first_equal
 from anim.measure.error.metric import ErrorMetric, MotionError
@@ -178,7 +178,7 @@ def _compare_pairs(
         except AnimError as error:
             raise error.at(clip_label(before.name, i)) from None
         if alike and before.tracks == after.tracks:
-            measured = _Measured(MotionError(0.0, float(times[0]), "", "", len(times)), 0.0, STILL)
+            measured = _Measured(no_error(times), 0.0, STILL)
         else:
             measured = _measure(prover, before, after, times, player=player, fps=fps)
         ends = before.end, after.end

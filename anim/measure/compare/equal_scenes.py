@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from anim.arrays import Floats
 from anim.measure.compare.correspondence import Correspondence
+from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
-from anim.model import Scene, Skeleton
+from anim.model import Clip, Scene, Skeleton
 
 REST = ("parents", "translation", "rotation", "scale", "sheared", "sheared_local")
+
+
+def play_alike(ruler: ErrorMetric, before: Clip, after: Clip) -> bool:
+    """Return whether two clips have equal tracks, on scenes that are equal in what a metric measures."""
+    return before.tracks == after.tracks and are_equal(ruler.scene, ruler.other, ruler.pairs)
+
+
+def no_error(times: Floats) -> MotionError:
+    """Return the error of such clips, at times (F,) in s."""
+    return MotionError(0.0, float(times[0]), "", "", len(times))
 
 
 def are_equal(scene: Scene, other: Scene, pairs: Correspondence) -> bool:
