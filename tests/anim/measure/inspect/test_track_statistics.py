@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from anim.measure.inspect import track_statistics
 from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.model import AccessorFormat, Skeleton, Track
 from anim.sampling import batch as module
@@ -109,6 +110,7 @@ def test_a_quaternion_of_another_length_is_needed() -> None:
 @pytest.mark.parametrize("limit", [1, 4096])
 def test_many_rotations_against_a_loop(limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MAX_GROUP_KEYS", limit)
+    monkeypatch.setattr(track_statistics, "BLOCK_KEYS", limit)
     rng = np.random.default_rng(5)
     tracks = [_turning(rng, int(keys)) for keys in rng.integers(1, 12, 20)]
     found = of(*tracks)
