@@ -168,6 +168,13 @@ def primitives(count: int) -> bytes:
     return _file([{"mesh": 0}], animations=[_clip([0])], meshes=[{"primitives": parts}], materials=materials)
 
 
+def primitives_equal(count: int) -> bytes:
+    """Primitives of one mesh on the same accessors."""
+    parts = [{**MESH["primitives"][0], "indices": 6}] * count
+    more = [("SCALAR", 5123, [0, 1, 2])]
+    return _file([{"mesh": 0}], animations=[_clip([0])], meshes=[{"primitives": parts}], more=more)
+
+
 def lists(count: int) -> bytes:
     """Accessors, buffer views, images, textures, materials, cameras and scenes that nothing uses."""
     document = json.loads(_file([{"name": "n", "mesh": 0}], animations=[_clip([0])], meshes=[MESH])[20:])
@@ -260,7 +267,7 @@ GLTF: Mapping[str, Make] = {
     each.__name__: each
     for each in (
         chain, chain_bare, chain_mesh, chain_open, side, side_meshes, side_moving, skins, joints, clips_equal,
-        clips_different, clips_empty, channels, keys, targets, primitives, lists, names,
+        clips_different, clips_empty, channels, keys, targets, primitives, primitives_equal, lists, names,
     )
 }  # fmt: skip
 PHYSICS: Mapping[str, tuple[str, Make]] = {
