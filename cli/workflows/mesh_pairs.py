@@ -27,6 +27,8 @@ def is_bake_of(old: Scene, new: Scene, num_clips: int) -> bool:
 
     num_clips: of the new file. A bake has at most one: files with more, and other morph targets, are two versions.
     """
+    if not any(each.skin is None and len(each.mesh.targets) for each in new.instances):
+        return False
     pairs = ((old.instances[i], new.instances[k]) for i, k in instance_pairs(old, new))
     return any(
         before.skin is not None or (num_clips <= 1 and _has_other_targets(before.mesh, after.mesh))

@@ -289,3 +289,12 @@ def test_a_scene_is_read_once_for_change_and_measure(
     counted = count_calls(monkeypatch, reader, "scene")
     call("loop", tmp_path / "in.glb", tmp_path / "out.glb", "--blend", "0.1").product()
     assert len(counted) == 1
+
+
+def test_meshes_are_not_paired_where_none_can_be_a_bake(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.side_meshes(3))
+    counted = count_calls(monkeypatch, mesh_pairs, "instance_pairs")
+    call("diff", tmp_path / "in.glb", tmp_path / "in.glb").product()
+    assert not counted

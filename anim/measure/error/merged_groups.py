@@ -67,7 +67,8 @@ def merge_surfaces(
     rigid: list[Surface] = []
     for each, binding in surfaces:
         is_rigid = len(each.nodes) == 1 and not len(each.targets)
-        surface, new = (each, None) if is_rigid and binding is None else _reduce(each, binding, skeleton)
+        is_same = binding is None or _has_joints(each, binding)
+        surface, new = (each, None) if is_rigid and is_same else _reduce(each, binding, skeleton)
         if is_rigid and new is None:
             rigid.append(each)
         else:
@@ -146,5 +147,8 @@ def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton
         bind=matrix.multiply(offsets[binding.nodes], binding.bind),
         owner=int(anchors[binding.owner]),
     )
-    is_same = np.array_equal(new.nodes, old.nodes) and np.array_equal(new.bind, old.bind)
-    return old, None if is_same and not len(surface.targets) else new
+    return old, None if _has_joints(old, new) and not len(surface.targets) else new
+
+
+def _has_joints(surface: Surface, binding: Binding) -> bool:
+    return np.array_equal(binding.nodes, surface.nodes) and np.array_equal(binding.bind, surface.bind)
