@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import io
 import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from anim.arrays import Bytes
-from anim.errors import FormatError
+from anim.errors import FormatError, UnsupportedError
+from anim.memory import limit_for
 
 GLB_MAGIC = b"glTF"
+STREAM_CHUNK_BYTES = 1 << 20
 
 
 class CompanionFiles:
@@ -46,11 +49,37 @@ def read_file(
 
 
 def read_gltf(file: io.BufferedReader) -> bytes:
-    """Return all bytes of an open file; of what can't be a glTF only the first ones: a device may never end."""
+    """Return all bytes of an open file; of what can't be a glTF only the first ones: a device may never end.
+
+    Raises UnsupportedError for a pipe or device that is longer than the memory limit and than its header says.
+    """
     head = file.peek()
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    is_gltf = head[: len(GLB_MAGIC)] == GLB_MAGIC[: len(head)] or text[:1] in (b"{", b"")
-    return file.read() if is_gltf else head
+    is_glb = head[: len(GLB_MAGIC)] == GLB_MAGIC[: len(head)]
+    if not is_glb and text[:1] not in (b"{", b""):
+        return head
+    return file.read() if _is_regular(file) else _read_stream(file, int.from_bytes(head[8:12], "little") * is_glb)
+
+
+def _is_regular(file: io.BufferedReader) -> bool:
+    try:
+        return stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+    except OSError:  # as of bytes in memory
+        return False
+
+
+def _read_stream(file: io.BufferedReader, stated: int) -> bytes:
+    """All bytes of a pipe or device. stated: length of a GLB by its header, else 0."""
+    most, chunks, size = max(limit_for(0), stated), list[bytes](), 0
+    while chunk := file.read(STREAM_CHUNK_BYTES):
+        chunks.append(chunk)
+        size += len(chunk)
+        if size > most:
+            raise UnsupportedError(
+                f"is a pipe or device with more than {most / 1e9:.3g} GB",
+                help="raise `memory_limit`, or name a file",
+            )
+    return b"".join(chunks)
 
 
 def _in_folder(folder: Path, ending: str) -> str:

@@ -246,6 +246,12 @@ def test_what_never_ends_is_no_gltf(line: str, tmp_path: Path) -> None:
     assert "is no glTF" in refusal(shell(f"ulimit -v 4000000; gltf-anim {line}", tmp_path), 3)
 
 
+@pytest.mark.parametrize("stream", ["yes '{'", "yes ' '", "(printf 'glTF\\2\\0\\0\\0\\0\\1\\0\\0'; yes)"])
+def test_a_pipe_that_never_ends_is_refused(stream: str, tmp_path: Path) -> None:
+    done = shell(f"ulimit -v 4000000; {stream} | gltf-anim inspect --memory-limit 20MB -", tmp_path)
+    assert "stdin: is a pipe or device with more than 0.02 GB" in refusal(done, 4)
+
+
 def test_a_clip_that_is_too_long_to_measure_is_named(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "a.gltf"
     path.write_bytes(text(animated(times=[0, 1e6])))
