@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, unique_sorted
-from anim.measure.compare.equal_scenes import no_error, play_alike
+from anim.measure.compare.equal_scenes import are_equal_motions, no_error
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
 from anim.measure.error.metric import NOISE, ErrorMetric, MotionError
 from anim.measure.error.sample_times import SAME_MOMENT, cut_times, dense_times, key_and_mid_times
@@ -113,7 +113,7 @@ def _proven(
     slack: float = BOUND_SLACK,
 ) -> Proof:
     """The largest error at `times` and at those of a proof, which is tried only if the samples are within the bound."""
-    if play_alike(ruler, before, after):
+    if are_equal_motions(ruler, before, after):
         return Proof(None if prover is None else 0.0, no_error(times), players[0])
     look = ruler.sample_errors(before, after, times, players=players)
     if prover is None or look.error.max_error > max(bounds.max_error, FLOAT_NOISE * (ruler.diagonal or 1.0)):

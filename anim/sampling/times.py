@@ -35,8 +35,8 @@ def check_fps(fps: float) -> None:
 def frame_times(start: float, end: float, *, fps: float) -> Floats:
     """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
 
-    fps: frames per second, > 0. Raises RangeError otherwise; for a grid of over ten million frames DataRangeError, at a
-    rate that no clip has UnsupportedError, like other limits of what is computed.
+    fps: frames per second, > 0. Raises RangeError otherwise. Raises DataRangeError for over ten million frames of a
+    long clip, and UnsupportedError for as many at a rate that no clip has.
     frame_times(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
     frame_times(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
     """

@@ -149,3 +149,11 @@ def test_the_bind_pose_is_said_to_be_the_rest(kind: str, call: Call, biped: byte
     run = call(*args, stdin=glb_of(replace(document, json={**document.json, "nodes": nodes})))
     assert run.product()
     assert "3 joints rest elsewhere in the file than the skin was bound: the bind pose is the rest" in run.err
+
+
+@pytest.mark.parametrize("suffix", ["csv", "json"])
+def test_a_file_without_nodes_is_written_without_any(suffix: str, call: Call, tmp_path: Path) -> None:
+    clip_of_none = {"name": "a", "channels": [], "samplers": []}
+    (tmp_path / "in.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "animations": [clip_of_none]}))
+    call("to-euler", tmp_path / "in.gltf", tmp_path / f"out.{suffix}").product()
+    assert (tmp_path / f"out.{suffix}").stat().st_size

@@ -107,3 +107,21 @@ def test_usd_has_the_weights_without_a_pointer(folder: Path, call: Call) -> None
     assert "KHR_animation_pointer" not in run.err
     assert "max 0 mm" not in run.err
     assert "a.usda" in run.err
+
+
+def test_equal_pointers_at_weights_that_a_node_replaces_differ(call: Call, tmp_path: Path) -> None:
+    """The tracks are equal, and so are the nodes at rest, but only in one file the mesh's weights move the node."""
+    for name, own in (("a", None), ("b", [0.0, 0.75, 0.0])):
+        document = opened_fixture("morph_cube")
+        content = document.json
+        content["extensionsUsed"] = ["KHR_animation_pointer"]
+        del content["nodes"][0]["weights"]
+        if own is not None:
+            content["nodes"][0]["weights"] = own
+        pointer = {"KHR_animation_pointer": {"pointer": "/meshes/0/weights"}}
+        for animation in content["animations"]:
+            animation["channels"][0]["target"] = {"path": "pointer", "extensions": pointer}
+        (tmp_path / f"{name}.glb").write_bytes(glb_of(document))
+    found = call("diff", tmp_path / "a.glb", tmp_path / "b.glb", "--format", "json").json
+    assert all(each["max_error_m"] > 0.01 for each in found["clips"])
+    assert call("diff", tmp_path / "b.glb", tmp_path / "b.glb", "--format", "json").json["max_error_m"] == 0

@@ -43,7 +43,7 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     rows = csv.writer(out, lineterminator="\n")
     radians = convention.unit.radians
     rest = np.array([(node.translation, node.angles / radians, node.scale) for node in motion.nodes])
-    for node, values in zip(motion.nodes, rest.reshape(len(rest), -1), strict=True):
+    for node, values in zip(motion.nodes, rest.reshape(-1, 9), strict=True):
         parent = motion.nodes[node.parent].name if node.parent >= 0 else ""
         rows.writerow(["#node", node.name, parent, *map(_text, values.tolist())])
     columns = [column for node in motion.nodes for column in _columns(node, 1 / radians)]

@@ -14,7 +14,7 @@ from anim.model import Clip, Scene, Skeleton
 REST = ("parents", "translation", "rotation", "scale", "sheared", "sheared_local")
 
 
-def play_alike(ruler: ErrorMetric, before: Clip, after: Clip) -> bool:
+def are_equal_motions(ruler: ErrorMetric, before: Clip, after: Clip) -> bool:
     """Return whether two clips have equal tracks, on scenes that are equal in what a metric measures."""
     return before.tracks == after.tracks and are_equal(ruler.scene, ruler.other, ruler.pairs)
 
@@ -25,14 +25,18 @@ def no_error(times: Floats) -> MotionError:
 
 
 def are_equal(scene: Scene, other: Scene, pairs: Correspondence) -> bool:
-    """Return whether two scenes with these corresponding surfaces have equal nodes at rest and equal joints."""
+    """Return whether two scenes with these corresponding surfaces have equal nodes at rest, joints and morph weights.
+
+    Those of nodes with morph targets count too: pointers at weights move other nodes where they differ.
+    """
     if other is scene:
         return True
     one, second = scene.skeleton, other.skeleton
     return (
         np.array_equal(pairs.nodes, np.arange(len(second)))
+        and one.morphed == second.morphed
         and all(_same(one, second, name) for name in REST)
-        and all(new is None or _has_joints(surface, new) for surface, new in pairs.surfaces)
+        and all(new is None or _is_bound_alike(surface, new) for surface, new in pairs.surfaces)
     )
 
 
@@ -40,5 +44,5 @@ def _same(one: Skeleton, other: Skeleton, name: str) -> bool:
     return np.array_equal(getattr(one, name), getattr(other, name))
 
 
-def _has_joints(surface: Surface, new: Binding) -> bool:
+def _is_bound_alike(surface: Surface, new: Binding) -> bool:
     return all(np.array_equal(getattr(surface, name), getattr(new, name)) for name in Binding._fields)

@@ -22,6 +22,8 @@ class TrialCache:
 
     def add(self, name: Hashable, result: TrialResult) -> None:
         """Keep a result for later trials with the same decisions."""
+        if name in self._results:
+            return
         self._num_values += result.usage.size + sum(each.values.size for each in result.keys.values())
         if self._num_values > MAX_CACHED_VALUES:
             self._results.clear()

@@ -114,10 +114,9 @@ def of_document(
     """Return the motion of each clip index and skinning method; without clips the rest pose.
 
     scene: the document's, if the caller has it. nodes: only meshes on these; None for all. A file without a mesh is
-    shown as sticks from joint to joint.
-    textures: show base color textures, vertex colors and alpha. resolve: gives the bytes of a companion file by its
-    relative path, for images; None for input without a folder. note: called with notes on unsupported content.
-    Raises NotFoundError for a file without meshes and joints.
+    shown as sticks from joint to joint. textures: show base color textures, vertex colors and alpha. resolve: gives
+    the bytes of a companion file by its relative path, for images; None for input without a folder. note: called with
+    notes on unsupported content. Raises NotFoundError for a file without meshes and joints.
     """
     for name in methods:
         if name not in SKINNING_METHODS:
