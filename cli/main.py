@@ -133,8 +133,10 @@ def _remove_temporary_folder(before: str | None) -> None:
     made = os.environ.get(MATPLOTLIB_FOLDER)
     if made is not None and made != before:
         import shutil
+        import tempfile
 
-        shutil.rmtree(made, ignore_errors=True)
+        if os.path.dirname(made) == tempfile.gettempdir():
+            shutil.rmtree(made, ignore_errors=True)
 
 
 def _import_command(args: list[str]) -> None:

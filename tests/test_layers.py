@@ -94,7 +94,7 @@ PUBLIC = {
     "measure.loops": "end_frames joint_gaps loop_analysis recommendations skin_motion",
     "optimization.search": "plan",
     "optimization.tracks": "clip_ends needed_keys",
-    "show.filmstrip": "camera clips filmstrip image_file",
+    "show.filmstrip": "camera clips filmstrip frame_selection image_file",
     "show.page": "bakes comparison notebook page paired_meshes resources sources",
     "show.plots": (
         "collapse_plot easing_plot error_plot figure rate_distortion_plot rotations simulation_plot "

@@ -23,7 +23,7 @@ from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
 from anim.skinning.methods.registry import SKINNING_METHODS
 from anim.skinning.methods.skinner import Skinner
-from anim.skinning.small_meshes import NO_NODE, merge_small
+from anim.skinning.small_meshes import NO_NODE, merge_small_meshes
 
 SPACES = ("world", "mesh")
 REVERSED = [0, 2, 1]  # corners of a face with the other winding
@@ -101,7 +101,7 @@ def prepare_bake(
         merged: Sequence[MeshInstance] = chosen
     else:
         chosen = _wound_as_shown(chosen, rest)
-        merged = merge_small(chosen, scene.skeleton, skinned=method == "lbs")
+        merged = merge_small_meshes(chosen, scene.skeleton, skinned=method == "lbs")
     bound = _bind_all(bind, merged, make)
     return Baker(
         scene,

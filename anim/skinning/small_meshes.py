@@ -17,7 +17,7 @@ MERGED_VERTICES = 1 << 14  # of meshes that become one, about
 NO_NODE = -1  # of a mesh that is several
 
 
-def merge_small(instances: Sequence[MeshInstance], skeleton: Skeleton, *, skinned: bool) -> list[MeshInstance]:
+def merge_small_meshes(instances: Sequence[MeshInstance], skeleton: Skeleton, *, skinned: bool) -> list[MeshInstance]:
     """Return the same vertices and faces in the same order, neighbors without morph targets as one skinned instance.
 
     skinned: whether those with a skin are merged too: blended linearly, the joints of other vertices do not count.

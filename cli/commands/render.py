@@ -27,8 +27,9 @@ from anim.model import VertexCache
 from anim.operations.selection import Selection
 from anim.show.filmstrip import clips, filmstrip, image_file
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION
-from anim.show.filmstrip.clips import FilmstripClip, FrameSelection
+from anim.show.filmstrip.clips import FilmstripClip
 from anim.show.filmstrip.filmstrip import HEIGHT, ViewOptions
+from anim.show.filmstrip.frame_selection import MAX_FRAMES, FrameSelection
 from anim.show.terminal.picture import Protocol
 from anim.units import plural
 from cli import text
@@ -42,7 +43,7 @@ from cli.progress import announce_compiling
 
 EXTENSIONS = (".png", *image_file.ANIMATED_FORMATS)
 FRAMES, FPS = 8, 24.0
-MAX_FRAMES = 3000
+
 MIN_FRAME_COLUMNS = 24  # of half-block characters, to recognize a pose
 
 RenderSource = Annotated[

@@ -155,8 +155,9 @@ def _stored(primitive: Json) -> str:
 
 
 def _num_bytes(mesh: Mesh) -> int:
-    arrays = mesh.positions, mesh.faces, mesh.joints, mesh.weights, mesh.targets, mesh.normal_targets
-    return sum(each.nbytes for each in arrays if each is not None)
+    vertices = mesh.positions, mesh.faces, mesh.joints, mesh.weights, mesh.normals, mesh.tangents
+    targets = mesh.targets, mesh.normal_targets, mesh.tangent_targets
+    return sum(each.nbytes for each in (*vertices, *targets) if each is not None)
 
 
 def _material(primitive: Json) -> int:

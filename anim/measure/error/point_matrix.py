@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, Ints, unique_sorted
 from anim.measure.error.orientation_probes import shell_points as shells_of
-from anim.measure.error.surface import Surface, has_vertices, merge_small, surfaces
+from anim.measure.error.surface import Surface, has_vertices, merge_small_surfaces, surfaces
 from anim.model import Scene
 
 CARRIED = 0.1  # minimum weight with which a vertex represents a node
@@ -179,7 +179,7 @@ def sample_points(
     firsts = np.cumsum([0, *(len(surface.points) for surface in found)])
     more = np.array([firsts[owner] + vertex for owner, vertex in extra], np.int64)
     parts, start = [], 0
-    for surface in merge_small(found):
+    for surface in merge_small_surfaces(found):
         end = start + len(surface.points)
         wanted = extreme_vertices(surface) | set((more[(start <= more) & (more < end)] - start).tolist())
         parts.append(_of_surface(surface, np.array(sorted(wanted), np.int64)))
@@ -190,7 +190,7 @@ def sample_points(
 def all_points(scene: Scene, radius: float) -> PointMatrix:
     """Return all vertices of the scene by surface; without vertices, six points around every node."""
     if has_vertices(scene):
-        found = merge_small(surfaces(scene))
+        found = merge_small_surfaces(surfaces(scene))
         return _joined([_of_surface(surface, np.arange(len(surface.points))) for surface in found])
     return _joined(_shells(scene, frozenset(range(len(scene.skeleton))), radius))
 

@@ -76,13 +76,13 @@ def diagonal(scene: Scene) -> float:
     Of the vertices, skinned and morphed; of the nodes without any vertex.
     """
     world = rest_world(scene.skeleton)
-    meshes = merge_small(_of_instances(scene))
+    meshes = merge_small_surfaces(_of_instances(scene))
     points = [place_points(surface, world[surface.nodes], surface.rest_weights) for surface in meshes]
     every = np.concatenate(points or [world[:, :, 3]])
     return float(np.linalg.norm(every.max(axis=0) - every.min(axis=0))) if len(every) else 0.0
 
 
-def merge_small(found: Iterable[Surface]) -> Iterator[Surface]:
+def merge_small_surfaces(found: Iterable[Surface]) -> Iterator[Surface]:
     """Yield the same points in the same order, neighbors without morph targets as one surface without a name.
 
     Only those with equal numbers of influences: work per surface, in files of many, is work per few thousand points.

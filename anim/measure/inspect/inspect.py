@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,23 +49,10 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
         _clip(clip, ways[n], seams[n], measured_on, skeleton, next(counts), tracks=tracks)
         for n, clip in enumerate(looked_at)
     )
-    equal: dict[int, dict[str, Any]] = {}  # what clips with equal tracks have in common
     reports: list[ClipReport] = []
     for n, i in enumerate(numbers):
-        common = equal[first[n]] if first[n] in equal else equal.setdefault(n, next(measured))
-        stored_bytes_of_clip = round(packed * costs[i].data)
-        share = (stored_bytes_of_clip + costs[i].json) / contents.file_bytes if contents.file_bytes else 0.0
-        reports.append(
-            ClipReport(
-                **common,
-                index=i,
-                name=clips[i].name,
-                data_bytes=costs[i].data,
-                stored_bytes=stored_bytes_of_clip,
-                json_bytes=costs[i].json,
-                share=share,
-            )
-        )
+        report = next(measured) if first[n] == n else reports[first[n]]
+        reports.append(_with_costs(report, i, clips[i].name, costs[i], packed, contents.file_bytes))
     skins = range(len(json_array(json, "skins")))
     using = _instances_by_skin(document, scene)
     return Facts(
@@ -91,6 +78,22 @@ def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]
     return measure_seams(skin, parts, groups)
 
 
+def _with_costs(
+    report: ClipReport, number: int, name: str, cost: storage_cost.StorageCost, packed: float, file_bytes: int
+) -> ClipReport:
+    """The report of a clip with equal tracks under its own index and name, with its own bytes."""
+    stored_bytes = round(packed * cost.data)
+    return replace(
+        report,
+        index=number,
+        name=name,
+        data_bytes=cost.data,
+        stored_bytes=stored_bytes,
+        json_bytes=cost.json,
+        share=(stored_bytes + cost.json) / file_bytes if file_bytes else 0.0,
+    )
+
+
 def _clip(
     clip: Clip,
     way: root_motion.RootMotion,
@@ -100,37 +103,43 @@ def _clip(
     counted: TrackStats,
     *,
     tracks: bool,
-) -> dict[str, Any]:
-    """The fields of a clip's report that depend on its tracks only."""
+) -> ClipReport:
+    """The report of a clip, without index and bytes."""
     start, end = clip.start, clip.end
     counted = _with_end(clip, counted)
     estimated = frame_rate.estimate_frame_rate(clip.key_times)
-    return {
-        "start_s": start,
-        "end_s": end,
-        "duration_s": end - start,
-        "tracks": dict(Counter(track.path for track in clip.tracks)),
-        "interpolations": dict(Counter(str(track.interpolation) for track in clip.tracks)),
-        "keys": sum(len(track.times) for track in clip.tracks),
-        "frame_rate_fps": estimated.fps if estimated else None,
-        "frame_rate_regular": estimated.regular if estimated else None,
-        "constant_tracks": int(counted.constant.sum()),
-        "no_effect_tracks": int(counted.no_effect.sum()),
-        "repeating_tracks": _repeating(clip, counted),
-        "redundant_keys": int(counted.redundant.sum()),
-        "non_unit_rotations": int(counted.non_unit.sum()),
-        "sign_flips": int(counted.flips.sum()),
-        "sign_flips_in_splines": int(counted.flips[_splines(clip)].sum()),
-        "wide_steps": int(counted.wide.sum()),
-        "widest_step_rad": float(counted.widest.max(initial=0.0)),
-        "seam_m": seam.gap,
-        "seam_speed_m_per_s": seam.speed,
-        "seam_measured_on": measured_on,
-        "root": skeleton.display_name(way.root) if way.root >= 0 else "",
-        "root_distance_m": way.distance,
-        "root_speed_m_per_s": way.speed,
-        "track_list": tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
-    }
+    return ClipReport(
+        index=0,
+        name=clip.name,
+        start_s=start,
+        end_s=end,
+        duration_s=end - start,
+        tracks=dict(Counter(track.path for track in clip.tracks)),
+        interpolations=dict(Counter(str(track.interpolation) for track in clip.tracks)),
+        keys=sum(len(track.times) for track in clip.tracks),
+        frame_rate_fps=estimated.fps if estimated else None,
+        frame_rate_regular=estimated.regular if estimated else None,
+        data_bytes=0,
+        stored_bytes=0,
+        json_bytes=0,
+        share=0.0,
+        constant_tracks=int(counted.constant.sum()),
+        no_effect_tracks=int(counted.no_effect.sum()),
+        repeating_tracks=_repeating(clip, counted),
+        redundant_keys=int(counted.redundant.sum()),
+        non_unit_rotations=int(counted.non_unit.sum()),
+        sign_flips=int(counted.flips.sum()),
+        sign_flips_in_splines=int(counted.flips[_splines(clip)].sum()),
+        wide_steps=int(counted.wide.sum()),
+        widest_step_rad=float(counted.widest.max(initial=0.0)),
+        seam_m=seam.gap,
+        seam_speed_m_per_s=seam.speed,
+        seam_measured_on=measured_on,
+        root=skeleton.display_name(way.root) if way.root >= 0 else "",
+        root_distance_m=way.distance,
+        root_speed_m_per_s=way.speed,
+        track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
+    )
 
 
 def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:

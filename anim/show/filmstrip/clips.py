@@ -9,7 +9,6 @@ import numpy as np
 
 from anim.arrays import AnyArray, Bools, Floats
 from anim.caches.transforms import resample, up_axis
-from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf.document import Document
@@ -17,9 +16,9 @@ from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading import reader
 from anim.gltf.reading.materials import read_materials
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
-from anim.sampling import frame_times
 from anim.show.filmstrip import palette, root_path
 from anim.show.filmstrip.filmstrip import MAX_POINTS, Extent, Strip
+from anim.show.filmstrip.frame_selection import FrameSelection
 from anim.show.filmstrip.ground import ground_height
 from anim.show.filmstrip.materials import MaterialReader
 from anim.show.filmstrip.surface import Surface
@@ -30,55 +29,8 @@ MAX_LOADED_BYTES = 48_000_000  # positions of frames that are baked once for all
 NUM_FRAMING_FRAMES = 48  # frames of the whole motion for the framing of the camera
 MIN_FRAMING_FRAMES = 8  # of these, of meshes with MAX_FRAMING_VERTICES in few frames
 MAX_FRAMING_VERTICES = 4_000_000  # positions of all framing frames
-MAX_FRAMES = 3000
 STICK_SCALE = 1.9  # width relative to the sticks in files
 MAX_STICK_RATIO = 1.5  # relative to the median width, so that links to distant helper joints don't hide others
-
-
-@dataclass(frozen=True, slots=True)
-class FrameSelection:
-    """Selection of frames: given times, `count` even ones, or `fps` per second, from `begin` to `end` s.
-
-    begin, end: None for the clip's own.
-    """
-
-    at: tuple[float, ...] = ()
-    count: int | None = None
-    fps: float | None = None
-    begin: float | None = None
-    end: float | None = None
-
-    def check(self, start: float, end: float) -> None:
-        """Raise RangeError for a requested time outside all motions, which range from `start` to `end` s."""
-        for time in self.at:
-            if not start - SAME_FRAME_TOLERANCE_S <= time <= end + SAME_FRAME_TOLERANCE_S:
-                raise RangeError(f"there is no frame at {time:g} s (the motion goes from {start:g} s to {end:g} s)")
-
-    def span(self, start: float, end: float) -> tuple[float, float]:
-        """Return the first and last time in s of a motion from `start` to `end`. Raises RangeError for none."""
-        first = start if self.begin is None else max(self.begin, start)
-        last = end if self.end is None else min(self.end, end)
-        if first > last:
-            raise RangeError(
-                f"nothing lies from {first:g} s to {last:g} s (the motion goes from {start:g} s to {end:g} s)"
-            )
-        return first, last
-
-    def times(self, start: float, end: float) -> Floats:
-        """Return times (F,) s of a motion from `start` to `end`; of those in `at` only those within.
-
-        Raises RangeError if the selection is empty otherwise, or exceeds the greatest number of frames.
-        """
-        if self.at:
-            at = np.unique(np.array(self.at, np.float64))
-            return at[(at >= start - SAME_FRAME_TOLERANCE_S) & (at <= end + SAME_FRAME_TOLERANCE_S)]
-        first, last = self.span(start, end)
-        if self.fps is not None and self.count is None:
-            found = frame_times(first, last, fps=self.fps)
-            if len(found) > MAX_FRAMES:
-                raise RangeError(f"{len(found)} frames are too many for a picture (limit {MAX_FRAMES})")
-            return found
-        return np.linspace(first, last, self.count or 1) if last > first else np.array([first])
 
 
 @dataclass(frozen=True, slots=True)

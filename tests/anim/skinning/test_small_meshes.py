@@ -47,7 +47,7 @@ def test_vertices_are_those_of_each_mesh_alone(method: str, normals: bool, monke
     scene = _scene()
     played = clip(track("rotation", TIMES, about("x", [0, 40, 10]), node=1))
     found = prepare_bake(scene, method=method, normals=normals, rigid=True)
-    monkeypatch.setattr(baking, "merge_small", lambda instances, *_, **__: instances)
+    monkeypatch.setattr(baking, "merge_small_meshes", lambda instances, *_, **__: instances)
     alone = prepare_bake(scene, method=method, normals=normals, rigid=True)
     assert len(alone.bound) == len(scene.instances)
     assert len(found.bound) < len(alone.bound) - 2

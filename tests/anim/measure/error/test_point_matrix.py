@@ -182,7 +182,7 @@ def test_small_surfaces_are_measured_together(monkeypatch: pytest.MonkeyPatch) -
     counted = count_calls(monkeypatch, points_, "_of_surface")
     all_points(of, 0.0)
     assert len(counted) == 4
-    monkeypatch.setattr(points_, "merge_small", list)
+    monkeypatch.setattr(points_, "merge_small_surfaces", list)
     for found, alone in zip(together, (all_points(of, 0.0), sample_points(of, set(), 0.0, extra)), strict=True):
         np.testing.assert_array_equal(found.nodes, alone.nodes)
         np.testing.assert_array_equal(found.joints, alone.joints)

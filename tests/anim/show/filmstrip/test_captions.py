@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from anim.show.filmstrip import captions, clips
-from anim.show.filmstrip.clips import FrameSelection
 from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
+from anim.show.filmstrip.frame_selection import FrameSelection
 from tests.files import opened_fixture
 
 LONG = "Dualwield_Melee_Attack_Chop"

@@ -14,8 +14,8 @@ from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
 from anim.show.filmstrip import clips, renderer
 from anim.show.filmstrip import filmstrip as filmstrip_module
-from anim.show.filmstrip.clips import FrameSelection
 from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
+from anim.show.filmstrip.frame_selection import FrameSelection
 from tests.clips import skeleton
 from tests.files import opened_fixture
 

@@ -10,7 +10,7 @@ import pytest
 
 from anim.model.vertex_cache import VertexCache, from_arrays
 from anim.show.filmstrip import clips
-from anim.show.filmstrip.clips import FrameSelection
+from anim.show.filmstrip.frame_selection import FrameSelection
 from anim.show.filmstrip.ground import ground_height
 from tests.files import mark_slow, opened_path
 

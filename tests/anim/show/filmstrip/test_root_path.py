@@ -14,8 +14,8 @@ from anim.model import Clip
 from anim.model.vertex_cache import from_arrays
 from anim.show.filmstrip import clips, root_path
 from anim.show.filmstrip.camera import fit_camera
-from anim.show.filmstrip.clips import FrameSelection
 from anim.show.filmstrip.filmstrip import ViewOptions, filmstrip
+from anim.show.filmstrip.frame_selection import FrameSelection
 from tests.files import opened_fixture
 
 BODY = np.array([[0, 0, 0], [0.5, 0, 0], [0, 1.7, 0.2]])

@@ -12,8 +12,8 @@ from PIL import Image
 
 from anim.gltf.document import Document
 from anim.show.filmstrip import clips
-from anim.show.filmstrip.clips import FrameSelection
 from anim.show.filmstrip.filmstrip import Extent, ViewOptions, filmstrip
+from anim.show.filmstrip.frame_selection import FrameSelection
 from fixtures.broken.pieces import FLOAT32, UINT8, buffered, text
 from tests.files import opened
 
