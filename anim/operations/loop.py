@@ -147,12 +147,10 @@ def _correct(
     times = _times(tracks, blend.start, blend.end, blend.frame_rate)
     if tracks.in_tangents is not None:
         return _correct_spline(tracks, times, _Correction(blend.start, blend.end, gap, change))
-    last_piece = float(times[-1] - times[-2])
-    before_last = _closing_offset(
-        tracks, _extrapolate(tracks, first, speed, -last_piece), sample(tracks, times[-2:-1])[0]
-    )
-    slope = _end_slope(gap, before_last, blend.seconds, last_piece)
-    return _correct_linear(tracks, times, _Correction(blend.start, blend.end, gap, slope))
+    values, last_piece = sample(tracks, times), float(times[-1] - times[-2])
+    before_last = _closing_offset(tracks, _extrapolate(tracks, first, speed, -last_piece), values[-2])
+    correction = _Correction(blend.start, blend.end, gap, _end_slope(gap, before_last, blend.seconds, last_piece))
+    return tracks.with_keys(times, _add_correction(tracks, values, correction.value(times))).split()
 
 
 def _close_steps(tracks: StackedTracks, end: float, first: Floats) -> list[Track]:
@@ -218,11 +216,6 @@ class _Correction:
 
     def _inside(self, times: Floats) -> Bools:
         return (times > self.start)[:, None, None]
-
-
-def _correct_linear(track: StackedTracks, times: Floats, correction: _Correction) -> list[Track]:
-    values = _add_correction(track, sample(track, times), correction.value(times))
-    return track.with_keys(times, values).split()
 
 
 def _times(track: StackedTracks, start: float, end: float, frame_rate: float | None) -> Floats:

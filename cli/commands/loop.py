@@ -11,9 +11,9 @@ import typer
 from anim.errors import AnimError
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
-from anim.measure.equal_clips import first_equal, repeat_change, track_digests
+from anim.measure.equal_clips import first_equal, repeat_change
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loop, best_ranges
+from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loops, best_ranges
 from anim.measure.loops.recommendations import recommend
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
@@ -27,7 +27,7 @@ from cli.options.common import Format
 from cli.reports import json_report
 from cli.text import Reporter, format_length, format_speed
 from cli.workflows import many_files
-from cli.workflows.edit_clips import edit_clips
+from cli.workflows.edit_clips import Clips, Tracks, edit_together
 
 SCHEMA = 1
 HELP = "--blend S closes the loop over the last S seconds; --clip selects clips"
@@ -84,7 +84,7 @@ def command(
         raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
     many_files.refuse_folder(input, help='a recipe closes loops of many files: steps = ["loop"], then gltf-anim run')
     closing_of = _Closing(blend, input)
-    edit_clips(
+    edit_together(
         input,
         output or documents.PIPE,
         selection,
@@ -92,12 +92,11 @@ def command(
         reporter,
         dry_run=dry_run,
         notes=closing_of.notes,
-        every_clip=True,
     )
 
 
 class _Closing:
-    """Closes clips one by one. blend: s, None to add a missing frame only. path: of the input.
+    """Closes clips, all analyzed together. blend: s, None to add a missing frame only. path: of the input.
 
     Clips that can't be closed are collected, so that one error names all of them before anything is written.
     """
@@ -105,29 +104,34 @@ class _Closing:
     def __init__(self, blend: float | None, path: str) -> None:
         self._blend = blend
         self._path = "stdin" if path == documents.PIPE else path
-        self._skin: SkinMotion | None = None
-        # The first of clips with equal tracks, and its result
-        self._done: dict[tuple[bytes, ...], tuple[Clip, Clip | UsageError]] = {}
         self._problems: list[str] = []
         self._poses: list[str] = []
 
-    def __call__(self, clip: Clip, tracks: frozenset[int], scene: Callable[[], Scene]) -> Clip:
-        name = f"clip '{clip.name}'" if clip.name else "a clip without a name"
-        if clip.end <= clip.start:
-            self._poses.append(name)
-            return clip
-        self._skin = self._skin or SkinMotion(scene())
-        key = track_digests(clip)
-        if key not in self._done:
-            try:
-                self._done[key] = clip, _closed(clip, tracks, self._skin, self._blend)
-            except UsageError as error:
-                self._done[key] = clip, error
-        old, new = self._done[key]
-        if isinstance(new, UsageError):
-            self._problems.append(f"{name} {new}")
-            return clip
-        return repeat_change(clip, old, new)
+    def __call__(self, clips: Clips, tracks: Tracks, scene: Callable[[], Scene]) -> Clips:
+        self._poses = [_label(each) for each in clips.values() if each.end <= each.start]
+        moving = {i: each for i, each in clips.items() if each.end > each.start}
+        if not moving:
+            return clips
+        numbers, every, skin = list(moving), list(moving.values()), SkinMotion(scene())
+        first = first_equal([(each,) for each in every])
+        distinct = sorted(set(first))
+        analyzed = dict(zip(distinct, _analyzed(skin, [every[n] for n in distinct]), strict=True))
+        new: dict[int, Clip] = dict(clips)
+        for i, n in zip(numbers, first, strict=True):
+            found, root = analyzed[n]
+            if problem := _problem(found, self._blend):
+                self._problems.append(f"{_label(clips[i])} {problem}")
+            elif numbers[n] < i:
+                new[i] = repeat_change(clips[i], every[n], new[numbers[n]])
+            else:
+                new[i] = self._close(clips[i], i, found, root, tracks(clips[i]))
+        return new
+
+    def _close(self, clip: Clip, number: int, found: Loop, root: int, tracks: frozenset[int]) -> Clip:
+        try:
+            return close_loop(clip, found, root=root, blend=self._blend, tracks=tracks)
+        except AnimError as error:
+            raise error.at(reader.clip_label(clip.name, number)) from None
 
     def notes(self, before: Mapping[int, Clip], after: Mapping[int, Clip]) -> Iterator[str]:
         """Yield notes on unchanged clips. Raises UsageError that names every clip that can't be closed."""
@@ -137,15 +141,20 @@ class _Closing:
             yield f"a single pose, without a loop to close: {', '.join(self._poses)}"
 
 
-def _closed(clip: Clip, tracks: frozenset[int], skin: SkinMotion, blend: float | None) -> Clip:
-    root = root_motion_node(skin.skeleton, clip)
-    found = analyze_loop(skin, clip, root=root)
-    if blend is None and found.kind not in (LoopKind.OPEN_BY_ONE_FRAME, LoopKind.CLOSED):
-        raise UsageError(_problem(found), help=HELP)
-    return close_loop(clip, found, root=root, blend=blend, tracks=tracks)
+def _label(clip: Clip) -> str:
+    return f"clip '{clip.name}'" if clip.name else "a clip without a name"
 
 
-def _problem(found: Loop) -> str:
+def _analyzed(skin: SkinMotion, clips: Sequence[Clip]) -> list[tuple[Loop, int]]:
+    """The analysis of each clip, and its root, −1 for none."""
+    roots = [root_motion_node(skin.skeleton, each) for each in clips]
+    return list(zip(analyze_loops(skin, clips, roots), roots, strict=True))
+
+
+def _problem(found: Loop, blend: float | None) -> str:
+    """Reason for which a clip can't be closed, "" if it can. blend: s, None to add a missing frame only."""
+    if blend is not None or found.kind in (LoopKind.OPEN_BY_ONE_FRAME, LoopKind.CLOSED):
+        return ""
     if found.kind is LoopKind.CLOSED_EXCEPT:
         return f"is closed except at {_names(found, quote=True)}: its end is {format_length(found.seam)} from its start"
     return f"is not a loop: its end is {format_length(found.seam)} from its start at '{found.node}'"
@@ -158,12 +167,12 @@ def _report(
         clips = reader.clips(source.document)
         chosen = selection.chosen_clips(reader.names(source.document))
         skin = _skin(source, reporter)
-        rows: list[tuple[str, Loop]] = []
         first = first_equal([(clips[i],) for i in chosen])
-        loops: list[list[Loop]] = []
-        for n, i in enumerate(chosen):
-            loops.append(loops[first[n]] if first[n] < n else _loops(skin, clips[i], find=find, shortest=shortest))
-            rows += [(reader.clip_name(clips[i].name, i), each) for each in loops[-1]]
+        distinct = sorted(set(first))
+        analyzed = dict(zip(distinct, _loops(skin, [clips[chosen[n]] for n in distinct], find, shortest), strict=True))
+        loops = [analyzed[n] for n in first]
+    names = [reader.clip_name(clips[i].name, i) for i in chosen]
+    rows = [(name, each) for name, found in zip(names, loops, strict=True) for each in found]
     parts = list(zip(chosen, loops, strict=True)) if find else []
     judged = [] if find else [(i, each) for i, (each,) in zip(chosen, loops, strict=True)]
     advised, notes = list(recommend(judged)), list(_no_better(clips, parts)) if clips else ["no clips"]
@@ -176,12 +185,12 @@ def _report(
         )
 
 
-def _loops(skin: SkinMotion, clip: Clip, *, find: bool, shortest: float | None) -> list[Loop]:
-    """The analysis of a whole clip, or of its best ranges."""
-    root = root_motion_node(skin.skeleton, clip)
-    if find:
-        return best_ranges(skin, clip, root=root, shortest=shortest or 0.0)
-    return [analyze_loop(skin, clip, root=root)]
+def _loops(skin: SkinMotion, clips: Sequence[Clip], find: bool, shortest: float | None) -> list[list[Loop]]:
+    """The analysis of each clip as a whole, or of its best ranges."""
+    if not find:
+        return [[found] for found, _ in _analyzed(skin, clips)]
+    roots = (root_motion_node(skin.skeleton, each) for each in clips)
+    return [best_ranges(skin, each, root=i, shortest=shortest or 0.0) for each, i in zip(clips, roots, strict=True)]
 
 
 def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> Iterator[str]:

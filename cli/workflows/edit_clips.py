@@ -31,8 +31,10 @@ from cli.reports import image_notes
 from cli.reports.rotation_notes import describe_non_unit_keys
 from cli.text import DRY, format_span, format_time
 
-Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 Clips = Mapping[int, Clip]  # by index in the file
+Tracks = Callable[[Clip], frozenset[int]]  # indices of a clip's selected tracks
+Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
+ChangeMany = Callable[[Clips, Tracks, Callable[[], Scene]], Clips]
 MAX_LISTED_CLIPS = 3  # clips listed with their durations; of more the sum
 
 
@@ -60,15 +62,50 @@ def edit_clips(
     measure: bool = True,
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
     advise: Callable[[Clip, int], str] = lambda clip, index: "",
-    every_clip: bool = False,
 ) -> None:
-    """Change the selected clips of one file and write it; report the result in one line on stderr.
+    """Change the selected clips of one file, one by one, and write it; report the result in one line on stderr.
 
-    change: gets a clip, the indices of its selected tracks, and a reader of the scene; returns the new clip.
+    change: gets a clip, the indices of its selected tracks, and a reader of the scene; returns the new clip. It gets
+    the first one of clips with equal tracks, and the others the same change. For the rest see `edit_together`.
+    advise: gets a clip that can't be changed, and its index, and returns the help of the error, or "".
+    """
+    many = partial(_change_each, change, advise)
+    edit_together(path, output, selection, many, reporter, dry_run=dry_run, measure=measure, notes=notes)
+
+
+def _change_each(
+    change: Change, advise: Callable[[Clip, int], str], clips: Clips, tracks: Tracks, scene: Callable[[], Scene]
+) -> Clips:
+    numbers = list(clips)
+    new: dict[int, Clip] = {}
+    for i, n in zip(numbers, first_equal([(clip,) for clip in clips.values()]), strict=True):
+        if numbers[n] in new:
+            new[i] = repeat_change(clips[i], clips[numbers[n]], new[numbers[n]])
+            continue
+        try:
+            new[i] = change(clips[i], tracks(clips[i]), scene)
+        except AnimError as error:
+            raise error.at(reader.clip_label(clips[i].name, i)).advise(advise(clips[i], i)) from None
+    return new
+
+
+def edit_together(
+    path: str,
+    output: str,
+    selection: Selection,
+    change: ChangeMany,
+    reporter: text.Reporter,
+    *,
+    dry_run: bool,
+    measure: bool = True,
+    notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
+) -> None:
+    """Change the selected clips of one file in one call and write it; report the result in one line on stderr.
+
+    change: gets the clips, a function for the indices of their selected tracks, and a reader of the scene; returns the
+    new clips.
     measure: compare the motion of the written file with that of the input, on the surface.
     notes: gets the changed clips, before and after, and returns notes for the user, a line each.
-    advise: gets a clip that can't be changed, and its index, and returns the help of the error, or "".
-    every_clip: whether `change` gets every clip; else only the first one of those with equal tracks.
     """
     began = time.perf_counter()
     if not dry_run:
@@ -80,18 +117,10 @@ def edit_clips(
         skeleton = reader.skeleton(document)
         chosen = selection.chosen_clips([clip.name for clip in clips])
         scene = cache(partial(_scene, document, accessors, skeleton))
-        first = range(len(chosen)) if every_clip else first_equal([(clips[i],) for i in chosen])
-        new: dict[int, Clip] = {}
-        for i, n in zip(chosen, first, strict=True):
-            if chosen[n] in new:
-                new[i] = repeat_change(clips[i], clips[chosen[n]], new[chosen[n]])
-                continue
-            try:
-                new[i] = change(clips[i], selection.chosen_tracks(clips[i], skeleton), lambda: scene()[0])
-            except AnimError as error:
-                raise error.at(reader.clip_label(clips[i].name, i)).advise(advise(clips[i], i)) from None
+        tracks = partial(selection.chosen_tracks, skeleton=skeleton)
+        changed = change({i: clips[i] for i in chosen}, tracks, lambda: scene()[0])
         stale = badly_stored(document.json)
-        new = {i: clip for i, clip in new.items() if i in stale or not _is_same(clip, clips[i])}
+        new = {i: clip for i, clip in changed.items() if i in stale or not _is_same(clip, clips[i])}
         for note in notes({i: clips[i] for i in new}, new):
             reporter.info(f"note: {note}")
         result = writer.replace_clips(document, new)

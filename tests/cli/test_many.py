@@ -112,7 +112,7 @@ def test_equal_loops_are_analyzed_once(
     options: list[str], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "in.gltf").write_bytes(equal_clips(CLIPS))
-    counted = count_calls(monkeypatch, loop_analysis, "_judge")
+    counted = count_calls(monkeypatch, loop_analysis, "_loop")
     line = [str(tmp_path / "out.glb") if each == "OUT" else each for each in options]
     call("loop", tmp_path / "in.gltf", *line).product()
     assert len(counted) == 1

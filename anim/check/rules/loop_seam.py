@@ -14,7 +14,8 @@ from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
 from anim.measure.inspect.frame_rate import GRID_TOLERANCE_FRAMES, estimate_frame_rate, usual_frame_rate
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.joint_gaps import joint_gaps
+from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.joint_gaps import JointGap, joint_gaps
 from anim.model import Clip
 from anim.units import format_number
 
@@ -30,14 +31,15 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         size = clip.seam_m / file.diagonal if file.diagonal else 0.0
         is_near = size < parameters["limit"] or re.search(LOOP_NAME, clip.name) is not None
         if is_near and size > parameters["gap"] and clip.duration_s > 0:
-            gaps = joint_gaps(file.motion, *_ends(file, clip.index)) if clip.seam_measured_on == "skin" else []
+            gaps = _gaps(file, clip.index) if clip.seam_measured_on == "skin" else []
             yield file.in_clip(clip.index, value=size, time_s=clip.end_s, node=gaps[0].node if gaps else None)
 
 
-def _ends(file: CheckedFile, number: int) -> tuple[Clip, float, float, int]:
-    """A clip with its start, end and root, whose translation is no gap."""
+def _gaps(file: CheckedFile, number: int) -> list[JointGap]:
+    """The joints with a gap. The translation of a root that travels is none."""
     clip = file.contents.clips[number]
-    return clip, clip.start, clip.end, root_motion_node(file.skeleton, clip)
+    whole = LoopRange(clip, clip.start, clip.end, root=root_motion_node(file.skeleton, clip))
+    return joint_gaps(file.motion, [whole])[0]
 
 
 def problem(found: Sequence[Occurrence]) -> str:

@@ -42,7 +42,7 @@ def root_motions(
     """
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
-    depth = _depths(skeleton)
+    depth = skeleton.derive(_depths)
     roots = [_root(clip, depth, figure) if clip.end > clip.start else -1 for clip in clips]
     if max(roots) < 0:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
@@ -83,7 +83,7 @@ def root_motion_node(skeleton: Skeleton, clip: Clip) -> int:
     It is the translated node nearest to the root, if it has descendants and its displacement is at least 0.7 of the
     length of its path.
     """
-    root = _root(clip, _depths(skeleton)) if len(skeleton) else -1
+    root = _root(clip, skeleton.derive(_depths)) if len(skeleton) else -1
     return root if _leads(skeleton, clip, root) else -1
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -20,59 +20,80 @@ MAX_MATRICES = 250_000  # nodes × changed nodes per block, each about 500 bytes
 Differences: TypeAlias = Callable[[Ints], Floats]  # of matrices (J, F, 3, 4) of nodes (J,)
 
 
-def carried_distances(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> Floats:
-    """Return the largest distance (K,) that a point moves if one of the nodes (K,), alone, ends as it starts.
+def carried_distances(skin: SkinMotion, ends: Sequence[Pose], clip: Ints, nodes: Ints, roots: Ints) -> Floats:
+    """Return the largest distances (K,) that a point moves if one node of one clip, alone, ends as it starts.
 
-    both: start and end as a pose of two frames. root: its translation stays that of the end, −1 for none.
+    ends: the poses at the start and at the end of R clips, R frames each. clip: (K,) indices of these, in order.
+    nodes: (K,). roots: (R,) of each clip the node whose translation stays that of the end, −1 for none.
     """
-    if not len(skin.vertices):
+    if not len(skin.vertices) or not len(nodes):
         return np.zeros(len(nodes))
-    size = MAX_MATRICES // max(len(skin.skeleton), 1)
-    if len(nodes) <= size:
-        squares = _squares(skin.skeleton, both, nodes, root, skin.squares, skin.batch_size(1))
-    else:
-        blocks = (nodes[first : first + max(size, 1)] for first in range(0, len(nodes), max(size, 1)))
-        squares = np.concatenate([_squares_of_part(skin, both, block, root) for block in blocks])
-    return np.asarray(np.sqrt(squares))
+    size = max(MAX_MATRICES // len(skin.skeleton), 1)
+    is_whole = int(np.bincount(clip).max()) <= size
+    squares = []
+    for first in range(0, len(nodes), size):
+        block = slice(first, first + size)
+        changed = _Changed(clip[block], nodes[block], roots[clip[block]])
+        if is_whole:
+            squares.append(_squares(skin.skeleton, ends, changed, skin.squares, skin.batch_size(1)))
+        else:
+            squares.append(_squares_of_part(skin, ends, changed))
+    return np.asarray(np.sqrt(np.concatenate(squares)))
+
+
+class _Changed(NamedTuple):
+    """Single nodes that change: clip (K,), in order, node (K,), and the clip's root (K,) or −1."""
+
+    clip: Ints
+    node: Ints
+    root: Ints
 
 
 def _squares(
-    skeleton: Skeleton, both: Pose, nodes: Ints, root: int, squares: Callable[[Differences], Floats], count: int
+    skeleton: Skeleton,
+    ends: Sequence[Pose],
+    changed: _Changed,
+    squares: Callable[[Differences], Floats],
+    count: int,
 ) -> Floats:
     """Largest squared distances (K,).
 
     squares: gives those of all points (P, F) from differences of matrices, for `count` frames at once.
     """
-    frame = np.arange(len(nodes))
-    parts = {name: np.repeat(getattr(both, name)[1:], len(nodes), axis=0) for name in PARTS}
-    for name, values in parts.items():
-        values[frame, nodes] = getattr(both, name)[0, nodes]
-    if root >= 0:
-        parts["translation"][:, root] = both.translation[1, root]
-    last = Pose(both.times[1:], both.translation[1:], both.rotation[1:], both.scale[1:])
-    times = np.repeat(both.times[1:], len(nodes))
-    changed = Pose(times, parts["translation"], parts["rotation"], parts["scale"])
-    differences = np.subtract(*(world_by_node(skeleton, each) for each in (changed, last)))
-    stretches = (differences[:, first : first + count] for first in range(0, len(nodes), count))
-    found = [squares(each.__getitem__).max(axis=0, initial=0.0) for each in stretches]
-    return np.concatenate(found) if found else np.zeros(0)
+    low, high = int(changed.clip[0]), int(changed.clip[-1]) + 1
+    start, end = (_take_frames(each, slice(low, high)) for each in ends)
+    clip = changed.clip - low
+    row = np.arange(len(clip))
+    new = _take_frames(end, clip)
+    for name in PARTS:
+        returns = row[changed.node != changed.root] if name == "translation" else row
+        node = changed.node[returns]
+        getattr(new, name)[returns, node] = getattr(start, name)[clip[returns], node]
+    differences = world_by_node(skeleton, new)
+    differences -= world_by_node(skeleton, end)[:, clip]
+    stretches = (differences[:, first : first + count] for first in range(0, len(clip), count))
+    return np.concatenate([squares(each.__getitem__).max(axis=0, initial=0.0) for each in stretches])
 
 
-def _squares_of_part(skin: SkinMotion, both: Pose, nodes: Ints, root: int) -> Floats:
+def _take_frames(pose: Pose, frames: Ints | slice) -> Pose:
+    return Pose(pose.times[frames], pose.translation[frames], pose.rotation[frames], pose.scale[frames])
+
+
+def _squares_of_part(skin: SkinMotion, ends: Sequence[Pose], changed: _Changed) -> Floats:
     """The same for a few nodes of many: only what is below them moves."""
-    below, kept = _subtrees(skin.skeleton, nodes)
+    below, kept = _subtrees(skin.skeleton, changed.node)
     index = np.cumsum(kept) - 1
     points = _points_below(skin.vertices, below, index)
     if not len(points):
-        return np.zeros(len(nodes))
+        return np.zeros(len(changed.node))
     rows = points.rows()
 
     def squares(differences: Differences) -> Floats:
         return rows.squares(stack_blocks(differences, points.nodes))
 
-    part = Pose(both.times, both.translation[:, kept], both.rotation[:, kept], both.scale[:, kept])
-    own_root = int(index[root]) if root >= 0 and kept[root] else -1
-    return _squares(_take(skin.skeleton, kept, index), part, index[nodes], own_root, squares, len(nodes))
+    part = [Pose(each.times, *(getattr(each, name)[:, kept] for name in PARTS)) for each in ends]
+    own = _Changed(changed.clip, index[changed.node], np.where(changed.root == changed.node, index[changed.node], -1))
+    return _squares(_take(skin.skeleton, kept, index), part, own, squares, len(changed.node))
 
 
 def _subtrees(skeleton: Skeleton, nodes: Ints) -> tuple[Bools, Bools]:

@@ -97,11 +97,12 @@ def poses_around_ends(
 def remove_root_motion(skeleton: Skeleton, world: Floats, root: int, origin: Floats | None = None) -> None:
     """Remove the displacement of node `root` since the first frame from world matrices, in place.
 
-    world: (N, F, 3, 4). root: −1 for none. origin: (3,) m, its place in the first frame, if that is not among these.
+    world: (N, F, 3, 4), or (N, ..., 3, 4) with `origin`: (3,) m, the root's place in the first frame. root: −1 for
+    none.
     """
     if root >= 0:
-        way = world[root, :, :, 3] - (world[root, :1, :, 3] if origin is None else origin)
-        world[..., 3] -= skeleton.descendants(root)[:, None, None] * way
+        way = world[root, ..., 3] - (world[root, :1, :, 3] if origin is None else origin)
+        world[..., 3] -= skeleton.descendants(root).reshape(-1, *[1] * way.ndim) * way
 
 
 def differences(values: Floats, axis: int, wanted: Floats = DIFFERENCES) -> Floats:

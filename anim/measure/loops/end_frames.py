@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -52,34 +52,54 @@ def find_end_frames(skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int
     if not len(skin.points):
         return [None] * len(clips)
     ranges = [_whole_range(clip, root) for clip, root in zip(clips, roots, strict=True)]
-    return [_end_frame(skin, each, seam) for each, seam in zip(ranges, measure_seams(skin, ranges), strict=True)]
+    seams = measure_seams(skin, ranges)
+    missing = [i for i, seam in enumerate(seams) if ranges[i].frame and _is_visible(skin, seam) and is_one_frame(seam)]
+    duplicate = [i for i, seam in enumerate(seams) if _may_be_duplicate(ranges[i]) and _is_noise(skin, seam)]
+    kinds = dict.fromkeys(_with(missing, _are_missing, skin, ranges), EndFrameKind.MISSING)
+    kinds |= dict.fromkeys(_with(duplicate, _are_duplicate, skin, ranges), EndFrameKind.DUPLICATE)
+    return [
+        EndFrame(kinds[i], each.frame, seam.gap) if i in kinds else None
+        for i, (each, seam) in enumerate(zip(ranges, seams, strict=True))
+    ]
 
 
 def _whole_range(clip: Clip, root: int) -> LoopRange:
     return LoopRange(clip, clip.start, clip.end, frame_duration(loop_frame_rate(clip), clip.start, clip.end), root)
 
 
-def _end_frame(skin: SkinMotion, whole: LoopRange, seam: Seam) -> EndFrame | None:
-    if whole.frame == 0:
-        return None
-    if seam.gap > VISIBLE_GAP_PER_SIZE * skin.size:
-        kind = EndFrameKind.MISSING if is_one_frame(seam) and _is_missing(skin, whole) else None
-    else:
-        is_closed = seam.gap <= NOISE_PER_SIZE * skin.size
-        kind = EndFrameKind.DUPLICATE if is_closed and _is_duplicate(skin, whole) else None
-    return None if kind is None else EndFrame(kind, whole.frame, seam.gap)
+def _is_visible(skin: SkinMotion, seam: Seam) -> bool:
+    return seam.gap > VISIBLE_GAP_PER_SIZE * skin.size
 
 
-def _is_missing(skin: SkinMotion, whole: LoopRange) -> bool:
-    clip, start, end, root = whole.clip, whole.start, whole.end, whole.root
-    moving = moving_nodes(skin, clip, start, end, whole.frame, root)
-    return not are_few(open_joints(skin, clip, start, end, root), moving)
+def _is_noise(skin: SkinMotion, seam: Seam) -> bool:
+    return seam.gap <= NOISE_PER_SIZE * skin.size
 
 
-def _is_duplicate(skin: SkinMotion, whole: LoopRange) -> bool:
-    frame, end = whole.frame, whole.end
-    if frame > MAX_DUPLICATE_FRAME_S or end - whole.start < MIN_FRAMES_WITH_DUPLICATE * frame:
-        return False
-    before = np.array([whole.start, end - 2 * frame, end - frame])
-    first, last, still = skin.steps(whole.clip, np.stack((before, before + frame)), whole.root) / skin.size
-    return bool(min(first, last) > VISIBLE_GAP_PER_SIZE and still <= NOISE_PER_SIZE)
+def _may_be_duplicate(whole: LoopRange) -> bool:
+    frame = whole.frame
+    return 0 < frame <= MAX_DUPLICATE_FRAME_S and whole.end - whole.start >= MIN_FRAMES_WITH_DUPLICATE * frame
+
+
+def _with(
+    numbers: Sequence[int],
+    judge: Callable[[SkinMotion, Sequence[LoopRange]], Sequence[bool]],
+    skin: SkinMotion,
+    ranges: Sequence[LoopRange],
+) -> list[int]:
+    """Those of some indices of ranges for which a function is true."""
+    return [i for i, fits in zip(numbers, judge(skin, [ranges[i] for i in numbers]), strict=True) if fits]
+
+
+def _are_missing(skin: SkinMotion, ranges: Sequence[LoopRange]) -> list[bool]:
+    both = zip(open_joints(skin, ranges), moving_nodes(skin, ranges), strict=True)
+    return [not are_few(joints, moving) for joints, moving in both]
+
+
+def _are_duplicate(skin: SkinMotion, ranges: Sequence[LoopRange]) -> list[bool]:
+    if not ranges:
+        return []
+    before = np.array([(each.start, each.end - 2 * each.frame, each.end - each.frame) for each in ranges])
+    after = before + np.array([each.frame for each in ranges])[:, None]
+    first, last, still = skin.steps(ranges, np.stack((before, after), axis=1)).T / skin.size
+    fits = (np.minimum(first, last) > VISIBLE_GAP_PER_SIZE) & (still <= NOISE_PER_SIZE)
+    return [bool(each) for each in fits]

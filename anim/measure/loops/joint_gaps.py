@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,10 @@ from anim.arrays import Bools, Floats, Ints
 from anim.maths import hierarchy, matrix
 from anim.measure.error.surface import Surface
 from anim.measure.loops.carried_distance import carried_distances
+from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Clip, Pose
-from anim.sampling.pose import sample_pose
+from anim.model import Pose
+from anim.sampling.pose import sample_clips
 
 
 class JointGap(NamedTuple):
@@ -28,29 +30,65 @@ class JointGap(NamedTuple):
     is_morph: bool = False
 
 
-def joint_gaps(skin: SkinMotion, clip: Clip, start: float, end: float, root: int = -1) -> list[JointGap]:
-    """Return the joints whose pose at `end` differs from that at `start`, the largest gap first.
+def joint_gaps(skin: SkinMotion, parts: Sequence[LoopRange]) -> list[list[JointGap]]:
+    """Return for each range the joints whose pose at its end differs from that at its start, the largest gap first.
 
-    The translation of `root` does not count. Morph weights count for the node of their mesh.
+    The translation of its root does not count. Morph weights count for the node of their mesh.
     """
-    both = sample_pose(skin.skeleton, clip, np.array([start, end]))
-    nodes = _moved_between(both, root)
-    rows = [
-        JointGap(skin.skeleton.display_name(node), node, gap)
-        for node, gap in zip(nodes.tolist(), carried_distances(skin, both, nodes, root).tolist(), strict=True)
-    ]
-    for node, weights in both.weights.items():
-        change = _morphed(skin, node, weights[1] - weights[0])
-        rows.append(JointGap(skin.skeleton.display_name(node), node, change, is_morph=True))
-    return sorted((each for each in rows if each.gap > 0), key=lambda each: (-each.gap, each.node))
+    found: list[list[JointGap]] = []
+    for some in _blocks(skin, parts, 2):
+        (start, end), weights = _sample(skin, some, [(each.start, each.end) for each in some])
+        roots = np.array([each.root for each in some])
+        clip, nodes = np.nonzero(_is_moved(start, end, roots))
+        gaps = carried_distances(skin, (start, end), clip, nodes, roots)
+        found += _by_clip(skin, weights, clip, nodes, gaps)
+    return found
 
 
-def moving_nodes(skin: SkinMotion, clip: Clip, start: float, end: float, frame: float, root: int = -1) -> set[int]:
-    """Return the nodes with points that move in the first or in the last frame."""
-    frames = (np.array([start, start + frame]), np.array([end - frame, end]))
-    found = [_moved_between(sample_pose(skin.skeleton, clip, times), root) for times in frames]
+def _by_clip(
+    skin: SkinMotion, weights: Sequence[Mapping[int, Floats]], clip: Ints, nodes: Ints, gaps: Floats
+) -> list[list[JointGap]]:
+    """The joints of each clip, sorted. weights: (2, M) by node, of each clip. clip, nodes, gaps: (K,)."""
+    rows: list[list[JointGap]] = [[] for _ in weights]
+    for i, node, gap in zip(clip.tolist(), nodes.tolist(), gaps.tolist(), strict=True):
+        if gap > 0:
+            rows[i].append(JointGap(skin.skeleton.display_name(node), node, gap))
+    for row, morphs in zip(rows, weights, strict=True):
+        for node, each in morphs.items():
+            if (change := _morphed(skin, node, each[1] - each[0])) > 0:
+                row.append(JointGap(skin.skeleton.display_name(node), node, change, is_morph=True))
+        row.sort(key=lambda each: (-each.gap, each.node))
+    return rows
+
+
+def moving_nodes(skin: SkinMotion, parts: Sequence[LoopRange]) -> list[set[int]]:
+    """Return for each range the nodes with points that move in its first or in its last frame."""
     carrying = _carrying(skin)
-    return {node for node in np.concatenate(found).tolist() if carrying[node]}
+    found: list[set[int]] = []
+    for some in _blocks(skin, parts, 4):
+        times = [(each.start, each.start + each.frame, each.end - each.frame, each.end) for each in some]
+        (first, second, before_last, last), _ = _sample(skin, some, times)
+        roots = np.array([each.root for each in some])
+        moves = carrying & (_is_moved(first, second, roots) | _is_moved(before_last, last, roots))
+        found += [set(np.flatnonzero(each).tolist()) for each in moves]
+    return found
+
+
+def _blocks(skin: SkinMotion, parts: Sequence[LoopRange], times: int) -> Iterator[Sequence[LoopRange]]:
+    """Yield the ranges in blocks whose poses at so many times each take little memory."""
+    size = skin.posed_at_once(times)
+    yield from (parts[first : first + size] for first in range(0, len(parts), size))
+
+
+def _sample(
+    skin: SkinMotion, parts: Sequence[LoopRange], times: Sequence[tuple[float, ...]]
+) -> tuple[list[Pose], list[dict[int, Floats]]]:
+    """Poses of R frames, one for each range, at the first, second … of its times; and its morph weights by node."""
+    at = np.array(times)
+    pose, weights = sample_clips(skin.skeleton, [each.clip for each in parts], at)
+    count = at.shape[1]
+    every = [slice(i, None, count) for i in range(count)]
+    return [Pose(pose.times[i], pose.translation[i], pose.rotation[i], pose.scale[i]) for i in every], weights
 
 
 def _carrying(skin: SkinMotion) -> Bools:
@@ -60,14 +98,17 @@ def _carrying(skin: SkinMotion) -> Bools:
     return hierarchy.with_ancestors(skin.skeleton.parents, carrying)
 
 
-def _moved_between(both: Pose, root: int) -> Ints:
-    """Indices of nodes with different local transforms in the two frames of a pose; q and −q are equal."""
-    differs = (both.scale[0] != both.scale[1]).any(axis=1)
-    differs |= np.minimum(*(np.abs(both.rotation[0] - s * both.rotation[1]).max(axis=1) for s in (1, -1))) > 0
-    shifted = (both.translation[0] != both.translation[1]).any(axis=1)
-    if root >= 0:
-        shifted[root] = False
-    return np.flatnonzero(differs | shifted)
+def _is_moved(before: Pose, after: Pose, roots: Ints) -> Bools:
+    """Mask (R, N) of nodes with other local transforms in `after` than in `before`, R frames each; q and −q are equal.
+
+    roots: (R,) nodes whose translation doesn't count, −1 for none.
+    """
+    differs = (before.scale != after.scale).any(axis=2)
+    differs |= np.minimum(*(np.abs(before.rotation - s * after.rotation).max(axis=2) for s in (1, -1))) > 0
+    shifted = (before.translation != after.translation).any(axis=2)
+    has_root = np.flatnonzero(roots >= 0)
+    shifted[has_root, roots[has_root]] = False
+    return np.asarray(differs | shifted)
 
 
 def _morphed(skin: SkinMotion, node: int, change: Floats) -> float:

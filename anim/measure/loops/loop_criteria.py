@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from anim.measure.inspect import frame_rate
+from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.joint_gaps import JointGap, joint_gaps
 from anim.measure.loops.seam import Seam
 from anim.measure.loops.skin_motion import SkinMotion
@@ -22,10 +23,10 @@ def is_one_frame(seam: Seam) -> bool:
     return seam.gap <= MAX_MISSING_FRAMES * seam.frame and seam.going_on <= seam.frame
 
 
-def open_joints(skin: SkinMotion, clip: Clip, start: float, end: float, root: int) -> tuple[JointGap, ...]:
-    """Return the joints with a gap above rounding, the largest first."""
-    gaps = joint_gaps(skin, clip, start, end, root)
-    return tuple(each for each in gaps if each.gap > NOISE_PER_SIZE * skin.size)
+def open_joints(skin: SkinMotion, parts: Sequence[LoopRange]) -> list[tuple[JointGap, ...]]:
+    """Return the joints of each range with a gap above rounding, the largest first."""
+    noise = NOISE_PER_SIZE * skin.size
+    return [tuple([each for each in gaps if each.gap > noise]) for gaps in joint_gaps(skin, parts)]
 
 
 def are_few(joints: Sequence[JointGap], moving: set[int]) -> bool:

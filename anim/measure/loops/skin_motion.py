@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -92,23 +92,25 @@ class SkinMotion:
         clip_ends.remove_root_motion(self.skeleton, world, root)
         return self.points.places(world)
 
-    def steps(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
-        """Return the largest distance (F,) that a vertex moves from the first of times (2, F) to the second.
+    def steps(self, parts: Sequence[LoopRange], times: Floats) -> Floats:
+        """Return the largest distance (R, F) that a vertex moves from the first of times (R, 2, F) to the second.
 
-        The displacement of node `root` is removed.
+        parts: R ranges, of whose clips and roots these are. The displacement of the roots is removed.
         """
-        return self._combined(clip, times, MOTION, root)
+        return self._combined(parts, times, MOTION)
 
-    def velocity_changes(self, clip: Clip, times: Floats, root: int = -1) -> Floats:
-        """Return the largest change of velocity (K,) of a vertex at times (K,), in m/s, without jumps.
+    def velocity_changes(self, parts: Sequence[LoopRange], times: Floats) -> Floats:
+        """Return the largest change of velocity (R, K) of a vertex at times (R, K), in m/s, without jumps.
 
-        Measured like `Seam.speed`, without the displacement of node `root`.
+        Measured like `Seam.speed` of the R clips, without the displacement of their roots.
         """
-        whole = LoopRange(clip, clip.start, clip.end, root=root)
-        around = np.array([-whole.probe, -whole.shortest, whole.shortest, whole.probe])[:, None]
-        held = np.array([-whole.shortest] * 2 + [whole.shortest] * 2)[:, None]
-        moves = self._combined(clip, times + around, VELOCITY_CHANGE, root, held=times + held)
-        return np.asarray(moves / (whole.probe - whole.shortest))
+        whole = [each._replace(start=each.clip.start, end=each.clip.end) for each in parts]
+        probe, shortest = np.array([(each.probe, each.shortest) for each in whole]).T
+        around = np.stack((-probe, -shortest, shortest, probe), axis=1)[..., None]
+        held = np.stack((-shortest, -shortest, shortest, shortest), axis=1)[..., None]
+        at = times[:, None]
+        moves = self._combined(parts, at + around, VELOCITY_CHANGE, held=at + held)
+        return np.asarray(moves / (probe - shortest)[:, None])
 
     def squares(self, differences: Callable[[Ints], Floats]) -> Floats:
         """Return the squared lengths (P, F) of differences of all points.
@@ -132,40 +134,63 @@ class SkinMotion:
             squares[np.isin(self.owners, [mesh.owner for mesh in morphing])] = 0
         return morphing
 
-    def _combined(self, clip: Clip, times: Floats, weights: Floats, root: int, *, held: Floats | None = None) -> Floats:
-        """Return the longest (F,) weighted sums of positions at times (S, F).
+    def _combined(
+        self, parts: Sequence[LoopRange], times: Floats, weights: Floats, *, held: Floats | None = None
+    ) -> Floats:
+        """Return the longest (R, F) weighted sums of positions at times (R, S, F).
 
         weights: (S,). held: times of STEP tracks.
         """
-        most = self.posed_at_once(len(times))
-        parts = []
-        origin: Floats | None = None
-        for start in range(0, times.shape[1], most):
-            some = times[:, start : start + most]
-            stops = None if held is None else held[:, start : start + most].reshape(1, -1)
-            world, (morphs,) = sample_world_matrices(self.skeleton, [clip], some.reshape(1, -1), step_times=stops)
-            origin = world[root, 0, :, 3].copy() if origin is None else origin
-            clip_ends.remove_root_motion(self.skeleton, world, root, origin)
-            world = world.reshape(len(world), *some.shape, 3, 4)
-            morphs = {node: each.reshape(*some.shape, -1) for node, each in morphs.items()}
-            count = self.batch_size(len(times))
-            for first in range(0, some.shape[1], count):
-                cut = slice(first, first + count)
-                of_morphs = {node: each[:, cut] for node, each in morphs.items()}
-                parts.append(self._longest(world[:, :, cut], of_morphs, weights))
-        return np.concatenate(parts)
+        found = np.empty((len(parts), times.shape[2]))
+        origins: list[Floats] = []
+        for rows, cut in _blocks(found.shape, self.posed_at_once(len(weights))):
+            some, stops = parts[rows], None if held is None else held[rows, :, cut]
+            world, morphs = self._posed(some, times[rows, :, cut], stops)
+            if cut.start == 0:
+                origins = [world[each.root, i, 0, 0, :, 3].copy() for i, each in enumerate(some)]
+            for i, each in enumerate(some):
+                clip_ends.remove_root_motion(self.skeleton, world[:, i], each.root, origins[i])
+            longest = found[rows, cut]
+            for few, frames in _blocks(longest.shape, self.batch_size(len(weights))):
+                of_morphs = [{node: each[:, frames] for node, each in one.items()} for one in morphs[few]]
+                longest[few, frames] = self._longest(world[:, few, :, frames], of_morphs, weights)
+        return found
 
-    def _longest(self, world: Floats, morphs: Mapping[int, Floats], weights: Floats) -> Floats:
-        """world: (N, S, F, 3, 4). morphs: (S, F, M) by node. weights: (S,)."""
-        size, stops, frames = world.shape[:3]
-        squares = self.squares(lambda nodes: np.tensordot(weights, world[nodes], (0, 1)))
-        morphing = self.exclude_morphing(squares, morphs)
+    def _posed(
+        self, parts: Sequence[LoopRange], times: Floats, held: Floats | None
+    ) -> tuple[Floats, list[dict[int, Floats]]]:
+        """World matrices (N, R, S, F, 3, 4) at times (R, S, F), and morph weights (S, F, M) by node of each range."""
+        stops = None if held is None else held.reshape(len(parts), -1)
+        clips = [each.clip for each in parts]
+        world, morphs = sample_world_matrices(self.skeleton, clips, times.reshape(len(parts), -1), step_times=stops)
+        shaped = [{node: each.reshape(*times.shape[1:], -1) for node, each in one.items()} for one in morphs]
+        return world.reshape(len(world), *times.shape, 3, 4), shaped
+
+    def _longest(self, world: Floats, morphs: Sequence[Mapping[int, Floats]], weights: Floats) -> Floats:
+        """world: (N, R, S, F, 3, 4). morphs: (S, F, M) by node, of each range. weights: (S,)."""
+        size, count, stops, frames = world.shape[:4]
+
+        def differences(nodes: Ints) -> Floats:
+            return np.tensordot(weights, world[nodes], (0, 2)).reshape(len(nodes), -1, 3, 4)
+
+        squares = self.squares(differences).reshape(-1, count, frames)
+        morphing = [self.exclude_morphing(squares[:, i], each) for i, each in enumerate(morphs)]
         most = np.sqrt(squares.max(axis=0)).astype(np.float64)
-        for mesh in morphing:
-            seen = EndPoses(world.reshape(size, -1, 3, 4), {mesh.owner: morphs[mesh.owner].reshape(stops * frames, -1)})
+        for i, mesh in ((i, mesh) for i, meshes in enumerate(morphing) for mesh in meshes):
+            of_mesh = {mesh.owner: morphs[i][mesh.owner].reshape(stops * frames, -1)}
+            seen = EndPoses(world[:, i].reshape(size, -1, 3, 4), of_mesh)
             moved = np.tensordot(weights, morphed_vertices(mesh, seen).reshape(stops, frames, -1, 3), (0, 0))
-            most = np.maximum(most, longest_each(moved))
+            most[i] = np.maximum(most[i], longest_each(moved))
         return np.asarray(most)
+
+
+def _blocks(shape: Sequence[int], most: int) -> Iterator[tuple[slice, slice]]:
+    """Yield slices of (R, F) values, of at most `most` values each: of whole rows, or of parts of one."""
+    rows, columns = shape
+    count = max(most // max(columns, 1), 1)
+    for first in range(0, rows, count):
+        for start in range(0, columns, most):
+            yield slice(first, first + count), slice(start, start + most)
 
 
 def morphed_vertices(mesh: Surface, seen: EndPoses) -> Floats:

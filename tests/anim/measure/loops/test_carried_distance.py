@@ -10,7 +10,7 @@ from anim.gltf.reading import reader
 from anim.measure.loops import carried_distance
 from anim.measure.loops.carried_distance import carried_distances
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Scene
+from anim.model import Clip, Pose, Scene
 from anim.sampling.pose import sample_pose
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened_fixture
@@ -22,9 +22,13 @@ TURN = clip(
 )
 
 
+def _ends(skin: SkinMotion, end: float, moving: Clip = TURN) -> list[Pose]:
+    return [sample_pose(skin.skeleton, moving, np.array([time])) for time in (0.0, end)]
+
+
 def _distances(skin: SkinMotion, root: int = -1) -> Floats:
-    both = sample_pose(skin.skeleton, TURN, np.array([0.0, 1.0]))
-    return carried_distances(skin, both, np.array([1, 2, 3, 4, 5]), root)
+    nodes = np.array([1, 2, 3, 4, 5])
+    return carried_distances(skin, _ends(skin, 1.0), 0 * nodes, nodes, np.array([root]))
 
 
 @pytest.mark.parametrize("root", [-1, 4])
@@ -40,15 +44,15 @@ def test_blocks_give_the_same_distances(limit: int, root: int, monkeypatch: pyte
 def test_blocks_of_a_skinned_figure_give_the_same_distances(monkeypatch: pytest.MonkeyPatch) -> None:
     document = opened_fixture("biped")
     skin = SkinMotion(reader.scene(document))
-    both = sample_pose(skin.skeleton, reader.clips(document)[0], np.array([0.0, 0.3]))
+    ends = _ends(skin, 0.3, reader.clips(document)[0])
     nodes = np.arange(len(skin.skeleton))
-    whole = carried_distances(skin, both, nodes, 0)
+    whole = carried_distances(skin, ends, 0 * nodes, nodes, np.array([0]))
     assert (whole > 0).sum() > 3
     monkeypatch.setattr(carried_distance, "MAX_MATRICES", 3 * len(nodes))
-    assert carried_distances(skin, both, nodes, 0) == pytest.approx(whole, rel=1e-4, abs=1e-7)
+    assert carried_distances(skin, ends, 0 * nodes, nodes, np.array([0])) == pytest.approx(whole, rel=1e-4, abs=1e-7)
 
 
 def test_a_scene_without_points_has_no_distances() -> None:
     skin = SkinMotion(Scene(skeleton([]), ()))
-    both = sample_pose(skin.skeleton, clip(), np.array([0.0, 1.0]))
-    assert carried_distances(skin, both, np.array([], np.int64), -1).shape == (0,)
+    none = np.array([], np.int64)
+    assert carried_distances(skin, _ends(skin, 1.0, clip()), none, none, np.array([-1])).shape == (0,)
