@@ -50,7 +50,8 @@ def error_against(source: CheckedFile, file: CheckedFile) -> float:
 
     Clips are matched by name, else by order, as by `diff`.
     """
-    from anim.measure.compare.name_matching import match_by_name_then_order  # imports most of `measure`
+    from anim.measure.compare.equal_scenes import store_alike  # imports most of `measure`
+    from anim.measure.compare.name_matching import match_by_name_then_order
     from anim.measure.continuous_bound.largest_error import largest_error
     from anim.measure.continuous_bound.prover import Prover
     from anim.measure.error.metric import ErrorMetric
@@ -59,6 +60,6 @@ def error_against(source: CheckedFile, file: CheckedFile) -> float:
     partners = match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     if (partners < 0).any():
         return float("inf")
-    prover = Prover(ErrorMetric(source.scene, file.scene))
+    prover = Prover(ErrorMetric(*store_alike(source.scene, file.scene)))
     errors = (largest_error(prover, clip, new[partners[i]]).error.max_error for i, clip in enumerate(old))
     return float(max(errors, default=0.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +53,8 @@ class Mesh:
     of normals and tangents by morph targets, or None.
     primitives: in the order of the file; empty if unknown. weight_sums: (V,) sums of the weights in the file, if any
     deviates from 1 by more than rounding.
+    repeats: of the last of the primitives, which have the vertices and faces of earlier ones and don't store them
+    again, the indices of those.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Mesh:
     tangents: Floats | None = None
     tangent_targets: Floats | None = None
     weight_sums: Floats | None = None
+    repeats: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         arrays.check_shape(self.positions, "V 3", name="positions")
@@ -79,6 +82,41 @@ class Mesh:
             raise ShapeError(f"skin weights of vertex {v} add up to {self.weights[v].sum():g} (expected 1)")
         if self.faces.size and int(self.faces.max()) >= len(self.positions):
             raise FormatError(f"a face uses vertex {self.faces.max()} (of {len(self.positions)})", where=where)
+
+    @property
+    def stored_primitives(self) -> tuple[PrimitiveRange, ...]:
+        """The primitives whose vertices and faces are stored, one after another."""
+        return self.primitives[: len(self.primitives) - len(self.repeats)]
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices in the file, with those of repeated primitives."""
+        return len(self.positions) + sum(self.primitives[i].vertices for i in self.repeats)
+
+    def count_uses(self) -> Ints:
+        """Return the number of primitives (V,) that have each vertex."""
+        if not self.repeats:
+            return np.ones(len(self.positions), np.int64)
+        stored = self.stored_primitives
+        uses = 1 + np.bincount(self.repeats, minlength=len(stored))
+        return np.repeat(uses, [each.vertices for each in stored])
+
+    def store_repeats(self) -> Mesh:
+        """Return the mesh with the vertices and faces of repeated primitives stored again, without directions."""
+        if not self.repeats:
+            return self
+        stored = self.stored_primitives
+        firsts = np.cumsum([0, *(each.vertices for each in stored)])
+        faces = np.split(self.faces, np.cumsum([each.faces for each in stored])[:-1])
+        added = np.cumsum([len(self.positions), *(stored[i].vertices for i in self.repeats)])
+        shifted = [faces[i] + (first - firsts[i]) for i, first in zip(self.repeats, added.tolist(), strict=False)]
+        kept = np.concatenate([np.arange(len(self.positions)), *(np.arange(*firsts[i : i + 2]) for i in self.repeats)])
+        return replace(
+            self.keep_vertices(kept),
+            faces=np.concatenate([self.faces, *shifted]),
+            primitives=self.primitives,
+            weight_sums=None if self.weight_sums is None else self.weight_sums[kept],
+        )
 
     def keep_vertices(self, kept: Ints) -> Mesh:
         """Return a mesh of some vertices (N,), with skin and morph targets, and without faces and directions."""
@@ -122,8 +160,13 @@ class Scene:
 
     @property
     def vertex_count(self) -> int:
-        """Number of vertices of all instances."""
-        return int(np.sum([len(i.mesh.positions) for i in self.instances], dtype=np.int64))
+        """Number of vertices of all instances, with those of repeated primitives."""
+        return sum(each.mesh.vertex_count for each in self.instances)
+
+    def store_repeats(self) -> Scene:
+        """Return the scene with repeated primitives of all meshes stored again, without directions."""
+        meshes = {each.mesh: each.mesh.store_repeats() for each in self.instances}
+        return replace(self, instances=tuple(replace(each, mesh=meshes[each.mesh]) for each in self.instances))
 
     def __repr__(self) -> str:
         counts = f"nodes={len(self.skeleton)}, instances={len(self.instances)}, vertices={self.vertex_count}"

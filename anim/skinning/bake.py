@@ -264,7 +264,7 @@ def _parts(scene: Scene, instances: Sequence[MeshInstance]) -> Iterator[MeshPart
     for each in instances:
         mesh = each.mesh
         name = mesh.name or scene.skeleton.names[each.node]
-        primitives = mesh.primitives or (PrimitiveRange(len(mesh.positions), len(mesh.faces)),)
+        primitives = mesh.stored_primitives or (PrimitiveRange(len(mesh.positions), len(mesh.faces)),)
         for primitive in primitives:
             ends = vertex + primitive.vertices, face + primitive.faces
             if primitive.vertices:

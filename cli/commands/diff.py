@@ -17,6 +17,7 @@ from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
+from anim.measure.compare.equal_scenes import store_alike
 from anim.measure.compare.name_matching import ambiguous_names, match_by_name
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import FPS
@@ -124,11 +125,15 @@ def command(
     if not (_is_cache(old) or _is_cache(new)):
         one = _opened(old, reporter)
         other = one if new is None else _opened(new, reporter)
+        first, second = store_alike(one.scene, other.scene)
+        one, other = one._replace(scene=first), other._replace(scene=second)
     if new is not None and (one is None or other is None or _are_bake_and_source(one, other)):
         if plot is not None or player is not SPEC:
             raise UsageError(f"{'--plot' if plot is not None else '--player'} does not apply to caches and bakes")
         opened = {
-            side.file.name: (side.document, side.file.size, side.scene) for side in (one, other) if side is not None
+            side.file.name: (side.document, side.file.size, side.scene.store_repeats())
+            for side in (one, other)
+            if side is not None
         }
         from cli.workflows.vertex_diff import diff_by_vertex
 
@@ -259,7 +264,7 @@ def _opened(path: str, reporter: Reporter) -> _Side:
         document = source.document
         accessors = Accessors(document)
         clips = reader.clips(document, accessors)
-        scene = scenes.read_scene(document, source.name, reporter, accessors=accessors)
+        scene = scenes.read_scene(document, source.name, reporter, accessors=accessors, repeats=False)
         if scene.instances and reader.is_default_scene_empty(document):
             reporter.warn(f"{source.name}: the default scene has no mesh, most players show nothing")
         cost = StorageCost(stored_bytes(document), storage_costs(document)[1].json)

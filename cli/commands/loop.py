@@ -218,7 +218,7 @@ def _why_none(clip: Clip, parts: list[Loop]) -> str:
 def _skin(source: Source, reporter: Reporter) -> SkinMotion:
     """Motion on which seams are measured: nodes if vertices can't be read."""
     try:
-        return SkinMotion(scenes.read_scene(source.document, source.name, reporter))
+        return SkinMotion(scenes.read_scene(source.document, source.name, reporter, repeats=False))
     except AnimError as error:
         hint = f" ({error.help})" if error.help else ""
         reporter.warn(f"measured at nodes, not on the skin: {error}{hint}")

@@ -24,14 +24,15 @@ def read_scene(
     skeleton: Skeleton | None = None,
     normals: bool = False,
     tangents: bool = False,
+    repeats: bool = True,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
     """Return the scene of a document; warn of normalized skin weights, ignored mesh copies and pointers without effect.
 
     name: of the file, for messages. accessors, skeleton: the document's, if the caller has them.
-    normals, tangents: whether to read those too. nodes: gives the nodes of the command's meshes; None for all.
+    normals, tangents, repeats: as for `reader.scene`. nodes: gives the nodes of the command's meshes; None for all.
     """
-    found = reader.scene(document, accessors, skeleton, normals=normals, tangents=tangents)
+    found = reader.scene(document, accessors, skeleton, normals=normals, tangents=tangents, repeats=repeats)
     warn_of_scene(found, document, name, reporter, accessors=accessors, chosen=nodes(found))
     return found
 

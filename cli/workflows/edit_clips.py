@@ -159,7 +159,7 @@ def check_clips(path: str, selection: Selection, reporter: text.Reporter) -> Non
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> tuple[Scene, AnimError | None]:
     """The scene; without meshes, and the reason, if their vertices can't be read."""
     try:
-        return reader.scene(document, accessors, skeleton), None
+        return reader.scene(document, accessors, skeleton, repeats=False), None
     except AnimError as error:  # unreadable vertices don't prevent a change of keys
         return Scene(skeleton, ()), error
 

@@ -107,7 +107,7 @@ def optimize_job(
     document = source.document
     accessors = Accessors(document)
     clips = tuple(reader.clips(document, accessors))
-    scene = scenes.read_scene(document, source.name, reporter, accessors=accessors)
+    scene = scenes.read_scene(document, source.name, reporter, accessors=accessors, repeats=False)
     return OptimizeJob(
         source,
         clips,

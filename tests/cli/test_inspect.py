@@ -6,12 +6,15 @@ import json
 import math
 import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fixtures
+from anim.gltf.document import copy_json
+from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Clip
 from tests.cli.conftest import Call, Find, Fixture
@@ -145,6 +148,17 @@ def test_a_skin_is_counted_vertex_by_vertex(call: Call) -> None:
     assert skin["mean_influences"] == pytest.approx((weights > 0).sum(axis=1).mean())
     assert (skin["unused_joints"], skin["off_sums"]) == (0, 0)
     assert skin["worst_sum_error"] == 0, "rounding does not count"
+
+
+def test_a_skin_is_counted_with_repeated_primitives(call: Call) -> None:
+    document = opened(built("biped"))
+    json = copy_json(document.json)
+    primitives = json["meshes"][0]["primitives"]
+    primitives += primitives[-1:] * 3
+    (skin,) = only(call, glb_of(replace(document, json=json)))["skins"]
+    weights = np.concatenate([each.mesh.weights for each in reader.scene(replace(document, json=json)).instances])
+    assert skin["vertices"] == len(weights)
+    assert skin["mean_influences"] == pytest.approx((weights > 0).sum(axis=1).mean())
 
 
 def test_weights_that_do_not_sum_up_are_found(call: Call) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from anim.measure.continuous_bound import node_bounds
 from anim.measure.continuous_bound.prover import Prover
+from anim.model import Mesh
 from tests import many
 from tests.cli.conftest import Call
 from tests.cli.test_many import LIMIT, work
@@ -66,3 +67,22 @@ def test_a_deep_chain_of_moving_nodes_is_sampled_and_bounded_once(
     call("resample", tmp_path / "in.glb", tmp_path / "out.glb", "--fps", "5").product()
     assert counted["certified"] == 1
     assert counted["product"] < 600
+
+
+@pytest.mark.parametrize("line", ["inspect", "check", "resample OUT --fps 20", "optimize OUT", "diff IN", "loop OUT"])
+def test_equal_primitives_are_measured_once(
+    line: str, call: Call, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = folder / "equal.glb"
+    path.write_bytes(many.primitives_equal(50))
+    stored: list[int] = []
+    check = Mesh.__post_init__
+
+    def checked(mesh: Mesh) -> None:
+        stored.append(len(mesh.positions))
+        check(mesh)
+
+    monkeypatch.setattr(Mesh, "__post_init__", checked)
+    command, *options = line.replace("OUT", "out.glb").replace("IN", str(path)).split()
+    assert call(command, str(path), *options).code == 0
+    assert max(stored) == 3

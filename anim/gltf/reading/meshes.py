@@ -23,16 +23,23 @@ class Meshes:
 
     Meshes and primitives of the same accessors share arrays, which are read-only.
 
-    normals, tangents: read those too.
+    normals, tangents: read those too. repeats: store the vertices of equal primitives again for each.
     """
 
     def __init__(
-        self, document: Document, accessors: Accessors, *, normals: bool = False, tangents: bool = False
+        self,
+        document: Document,
+        accessors: Accessors,
+        *,
+        normals: bool = False,
+        tangents: bool = False,
+        repeats: bool = True,
     ) -> None:
         self._meshes = json_array(document.json, "meshes")
         self._views = len(json_array(document.json, "bufferViews"))
         self._accessors = accessors
         self._wanted = {"NORMAL": normals, "TANGENT": tangents}
+        self._repeats = repeats
         self._done: dict[tuple[int, int], Mesh] = {}
         self._unnamed: dict[tuple[int, tuple[str, ...]], Mesh] = {}
 
@@ -67,9 +74,18 @@ class Meshes:
 
     def _joined(self, primitives: Sequence[Json], stored: Sequence[str], joint_count: int) -> Mesh:
         """The primitives as one mesh without name and materials; equal ones are read once."""
+        first: dict[str, int] = {}
+        places = [first.setdefault(text, i) for i, text in enumerate(stored)]
+        count = len(stored) if self._repeats else max(places, default=-1) + 1
+        mesh = self._stored_once(primitives[:count], stored, joint_count)
+        repeated = tuple(mesh.primitives[i] for i in places[count:])
+        return replace(mesh, primitives=(*mesh.primitives, *repeated), repeats=tuple(places[count:]))
+
+    def _stored_once(self, primitives: Sequence[Json], stored: Sequence[str], joint_count: int) -> Mesh:
+        """The primitives one after another."""
         read: dict[str, Mesh] = {}
         parts = []
-        for i, (primitive, text) in enumerate(zip(primitives, stored, strict=True)):
+        for i, (primitive, text) in enumerate(zip(primitives, stored, strict=False)):
             if text not in read:
                 try:
                     read[text] = self._primitive(primitive, joint_count)

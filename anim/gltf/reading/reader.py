@@ -99,10 +99,13 @@ def scene(
     *,
     normals: bool = False,
     tangents: bool = False,
+    repeats: bool = True,
 ) -> Scene:
     """Return the skeleton and its meshes, nodes depth-first in the order of the file's scenes.
 
     skeleton: the document's, if the caller has it. normals, tangents: read those of vertices and morph targets too.
+    repeats: store vertices again for the last primitives of a mesh that only repeat earlier ones (`Mesh.repeats`):
+    measures, for which those move alike, leave that out.
     A mesh with EXT_mesh_gpu_instancing is included once, on its node (`instanced_nodes`).
     Raises UnsupportedError if vertices cannot be read: Draco without the package DracoPy, an unknown compression,
     EXT_mesh_gpu_instancing where the file requires it.
@@ -111,7 +114,7 @@ def scene(
     check_not_required(document)
     accessors = accessors or Accessors(document)
     accessors.check_total(_vertex_accessors(document.json))
-    meshes = Meshes(document, accessors, normals=normals, tangents=tangents)
+    meshes = Meshes(document, accessors, normals=normals, tangents=tangents, repeats=repeats)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     nodes = json_array(document.json, "nodes")
     instances = []

@@ -40,6 +40,15 @@ def are_equal(scene: Scene, other: Scene, pairs: Correspondence) -> bool:
     )
 
 
+def store_alike(scene: Scene, other: Scene) -> tuple[Scene, Scene]:
+    """Return both scenes, with repeated primitives stored again unless both repeat the same ones.
+
+    Other tools store equal accessors once, or one accessor several times.
+    """
+    repeats = [[each.mesh.repeats for each in one.instances] for one in (scene, other)]
+    return (scene, other) if repeats[0] == repeats[1] else (scene.store_repeats(), other.store_repeats())
+
+
 def _same(one: Skeleton, other: Skeleton, name: str) -> bool:
     return np.array_equal(getattr(one, name), getattr(other, name))
 

@@ -57,6 +57,6 @@ def read_contents(document: Document, *, file_bytes: int, broken: BrokenFile | N
 
 def _scene(document: Document, accessors: Accessors, skeleton: Skeleton) -> tuple[Scene | None, AnimError | None]:
     try:
-        return reader.scene(document, accessors, skeleton), None
+        return reader.scene(document, accessors, skeleton, repeats=False), None
     except AnimError as error:
         return None, error

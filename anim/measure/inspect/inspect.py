@@ -202,18 +202,19 @@ def _skin(number: int, document: Document, scene: Scene | None, using: Sequence[
     if scene is None or not using:
         return SkinReport(number, name, len(joints), None if scene is None else 0, None, None, None, None, None)
     counts = np.concatenate([(i.mesh.weights > 0).sum(axis=1) for i in using])
-    off = [np.abs(i.mesh.weight_sums - 1) for i in using if i.mesh.weight_sums is not None]
-    sums = np.concatenate([np.empty(0), *off])
+    uses = np.concatenate([i.mesh.count_uses() for i in using])
+    off = [np.zeros(len(i.mesh.positions)) if (s := i.mesh.weight_sums) is None else np.abs(s - 1) for i in using]
+    sums = np.concatenate(off)
     unused = len(joints) - len(useful_joints(using, joints, scene.skeleton))
     return SkinReport(
         number,
         name,
         len(joints),
-        len(counts),
+        int(uses.sum()),
         unused,
         int(counts.max(initial=0)),
-        float(counts.mean()) if len(counts) else 0.0,
-        int((sums > 0).sum()),
+        float((uses * counts).sum() / uses.sum()) if len(counts) else 0.0,
+        int(uses[sums > 0].sum()),
         float(sums.max(initial=0.0)),
     )
 

@@ -47,7 +47,8 @@ def unnormalized_weights(instances: Iterable[MeshInstance]) -> list[WeightSums]:
         some = sums[(sums != 1) & (sums > 0)]
         least, most = (float(some.min()), float(some.max())) if len(some) else (0.0, 0.0)
         name = mesh.name or f"node {instance.node}"
-        found[mesh] = WeightSums(name, int((sums != 1).sum()), int((sums == 0).sum()), least, most)
+        uses = mesh.count_uses()
+        found[mesh] = WeightSums(name, int(uses[sums != 1].sum()), int(uses[sums == 0].sum()), least, most)
     return list(found.values())
 
 

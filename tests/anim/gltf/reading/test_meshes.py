@@ -216,3 +216,25 @@ def _skinned(joints: Any, weights: Any, *, second: tuple[Any, Any] | None = None
     content["meshes"] = [{"primitives": [{"attributes": attributes}]}]
     content["skins"] = [{"joints": [1, 2]}]
     return content
+
+
+def test_last_primitives_of_the_same_accessors_are_stored_once_if_wanted() -> None:
+    content = triangle(targets=1)
+    (first,) = content["meshes"][0]["primitives"]
+    second = {**first, "mode": 5}
+    content["materials"] = [{}, {}]
+    parts = [{**each, "material": i % 2} for i, each in enumerate((first, first, second, first, second))]
+    content |= {"meshes": [{"primitives": parts}], "nodes": [{"mesh": 0}]}
+    document = opened(text(content))
+    whole, once = (reader.scene(document, repeats=each) for each in (True, False))
+    mesh = once.instances[0].mesh
+    assert len(mesh.positions) == 9
+    assert mesh.repeats == (0, 2)
+    assert len(mesh.stored_primitives) == 3
+    assert mesh.primitives == whole.instances[0].mesh.primitives
+    assert mesh.count_uses().tolist() == [2] * 3 + [1] * 3 + [2] * 3
+    assert once.vertex_count == whole.vertex_count == 15
+    again = once.store_repeats().instances[0].mesh
+    assert not again.repeats
+    for name in ("positions", "faces", "targets", "joints", "weights"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(whole.instances[0].mesh, name))

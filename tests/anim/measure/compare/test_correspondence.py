@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anim.gltf.document import copy_json
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
+from anim.measure.compare.equal_scenes import store_alike
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Scene
@@ -236,3 +238,18 @@ def test_morph_weights_are_found_on_the_node_that_has_the_mesh() -> None:
     ruler = ErrorMetric(scene, other)
     assert ruler.error(before, moved).max_error == 0
     assert ruler.error(before, clip()).max_error > 0.01
+
+
+def test_a_primitive_twice_is_the_same_by_one_accessor_and_by_two() -> None:
+    document = opened_fixture("tube")
+    json = copy_json(document.json)
+    (primitive,) = json["meshes"][0]["primitives"]
+    json["accessors"].append(json["accessors"][primitive["attributes"]["POSITION"]])
+    attributes = {**primitive["attributes"], "POSITION": len(json["accessors"]) - 1}
+    twice: list[Scene] = []
+    for second in (primitive, {**primitive, "attributes": attributes}):
+        json["meshes"][0]["primitives"] = [primitive, second]
+        twice.append(reader.scene(replace(document, json=copy_json(json)), repeats=False))
+    assert [len(each.instances[0].mesh.positions) * 2 // each.vertex_count for each in twice] == [1, 2]
+    for one, other in (twice, twice[::-1], twice[:1] * 2):
+        assert ErrorMetric(*store_alike(one, other)).pairs.by_vertex
