@@ -123,13 +123,17 @@ def _index(nodes: Ints) -> Ints | slice:
 
 def _depth_first(parents: Ints) -> list[int]:
     """All nodes, parents before those below them."""
-    children: list[list[int]] = [[] for _ in parents]
-    waiting: list[int] = []
-    for node, parent in enumerate(parents.tolist()):
-        (children[parent] if parent >= 0 else waiting).append(node)
-    waiting.reverse()
-    order = []
+    first_child = [-1] * (len(parents) + 1)  # the last is the first root
+    next_sibling = [-1] * len(parents)
+    above = parents.tolist()
+    for node in reversed(range(len(above))):
+        next_sibling[node] = first_child[above[node]]
+        first_child[above[node]] = node
+    order, waiting = [], [first_child[-1]]
     while waiting:
-        order.append(waiting.pop())
-        waiting += reversed(children[order[-1]])
+        node = waiting.pop()
+        while node >= 0:
+            order.append(node)
+            waiting.append(next_sibling[node])
+            node = first_child[node]
     return order

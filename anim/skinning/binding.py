@@ -91,20 +91,23 @@ def influences(joints: Ints, weights: Floats) -> tuple[Ints, NDArray[np.int32], 
 def ancestor_joints(nodes: Ints, parents: Ints) -> Ints:
     """Return for each joint (J,) the index of the nearest joint above it, −1 for none.
 
-    Nodes between joints are passed once, however many joints are below them.
+    Nodes between joints are passed once, however many joints are below them; so is a node that is several joints,
+    of which the last counts.
     """
     if len(nodes) == 1:
         return np.array([-1])
-    number = {node: i for i, node in enumerate(nodes.tolist())}
-    nearest, found = dict(number), []  # of a joint itself, and of the nodes that were passed
-    for node in nodes.tolist():
+    distinct, first_from_end, joints = np.unique(nodes[::-1], return_index=True, return_inverse=True)
+    numbers = len(nodes) - 1 - first_from_end
+    nearest = dict(zip(distinct.tolist(), numbers.tolist(), strict=True))  # of a joint itself, and of passed nodes
+    found = []
+    for node in distinct.tolist():
         at, passed = int(parents[node]), []
         while at >= 0 and at not in nearest:
             passed.append(at)
             at = int(parents[at])
         found.append(nearest.get(at, -1))
         nearest.update(dict.fromkeys(passed, found[-1]))
-    return np.array(found, np.int64)
+    return np.array(found, np.int64)[joints[::-1]]
 
 
 def check_influences(joints: Ints, weights: Floats, count: int) -> None:

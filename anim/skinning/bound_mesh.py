@@ -18,6 +18,8 @@ from anim.skinning.kernels.layout import NO_OUTPUT, FloatArray, OutputSlice, Ver
 from anim.skinning.methods.skinner import Skinner, fill_lanes
 from anim.skinning.vertex_normals import SmoothNormals
 
+MAX_BLOCK_MATRICES = 100_000  # of joints, multiplied at a time: 10 MB of each operand
+
 Make: TypeAlias = Callable[[SkinBinding, bool], Skinner]
 
 
@@ -87,12 +89,16 @@ class BoundMesh:
         if self.in_mesh_space and self.instance.skin is None:
             count = len(frames.times[block])
             return np.broadcast_to(np.eye(4)[:3], (count, 1, 3, 4))
-        world = frames.world[self.rig.nodes, block]
-        joints, count = world.shape[:2]
-        whole = np.zeros((joints, 4, 4))
-        whole[:, :3], whole[:, 3, 3] = self.rig.bind, 1
-        product = world.reshape(joints, 3 * count, 4) @ whole  # one per joint, not per frame: ten times faster
-        return product.reshape(joints, count, 3, 4).transpose(1, 0, 2, 3)
+        nodes, count = self.rig.nodes, len(frames.times[block])
+        product = np.empty((len(nodes), 3 * count, 4))  # one per joint, not per frame: ten times faster
+        length = max(MAX_BLOCK_MATRICES // max(count, 1), 1)
+        for first in range(0, len(nodes), length):
+            some = slice(first, first + length)
+            world, bind = frames.world[nodes[some], block], self.rig.bind[some]
+            whole = np.zeros((len(bind), 4, 4))
+            whole[:, :3], whole[:, 3, 3] = bind, 1
+            np.matmul(world.reshape(len(bind), 3 * count, 4), whole, out=product[some])
+        return product.reshape(len(nodes), count, 3, 4).transpose(1, 0, 2, 3)
 
     def _shape(self, frames: PosedSkeleton, block: slice) -> VertexBlock:
         mesh, weights = self.instance.mesh, self._weights(frames, block)

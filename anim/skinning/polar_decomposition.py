@@ -58,10 +58,12 @@ def decompose_after(matrices: Floats, pivots: Floats, shape: Floats) -> PolarDec
 def joint_origins(rig: SkinBinding) -> Floats:
     """Return the position of each joint (J, 3) in mesh space at bind time; the origin if undefined."""
     linear = rig.bind[..., :3]
-    solvable = np.abs(np.linalg.det(linear)) > 0
-    found = np.zeros((len(linear), 3))
-    found[solvable] = -np.linalg.solve(linear[solvable], rig.bind[solvable][..., 3:])[..., 0]
-    return found
+    singular = np.abs(np.linalg.det(linear)) == 0
+    if singular.any():
+        linear = np.where(singular[:, None, None], np.eye(3), linear)
+    found = np.linalg.solve(linear, -rig.bind[..., 3:])[..., 0]
+    found[singular] = 0
+    return np.asarray(found, np.float64)
 
 
 def _is_rotation(linear: Floats) -> Bools:

@@ -65,14 +65,16 @@ def bind_shape(rig: SkinBinding) -> Floats | None:
     A bind matrix is a rotation after a stretch; this is the stretch without its scale, the mean over the joints by
     their weight. Exporters leave it there if a mesh with a non-uniform scale was bound.
     """
-    linear = rig.bind[..., :3]
-    _, factors, axes = np.linalg.svd(linear)
+    weight = np.bincount(rig.joint, rig.weight, minlength=len(rig.bind))
+    used = np.flatnonzero(weight)
+    _, factors, axes = np.linalg.svd(rig.bind[used, :, :3])
     sizes = np.prod(factors, axis=1)
-    weight = np.where(sizes > 0, np.bincount(rig.joint, rig.weight, minlength=len(linear)), 0)
+    weight[used[sizes == 0]] = 0
     if not weight.any():
         return None
     even = factors / np.cbrt(np.where(sizes > 0, sizes, 1))[:, None]
-    shape = np.average(np.swapaxes(axes, -1, -2) @ (even[..., None] * axes), axis=0, weights=weight)
+    stretch = np.swapaxes(axes, -1, -2) @ (even[..., None] * axes)
+    shape = (stretch * weight[used, None, None]).sum(axis=0) / weight.sum()
     return None if np.abs(shape - np.eye(3)).max() < SCALE_TOLERANCE else shape
 
 

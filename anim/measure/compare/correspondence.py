@@ -181,10 +181,14 @@ class _SceneMatcher:
 
     def by_nodes(self, surface: Surface) -> Binding:
         """Joints of a surface without a partner, from the correspondence of nodes alone."""
-        places = [self._place(int(node)) for node in surface.nodes]
-        bind = np.array([matrix.multiply(local, bind) for (_, local), bind in zip(places, surface.bind, strict=True)])
-        joints = np.array([node for node, _ in places], np.int64)
-        return Binding(joints, bind.reshape(-1, 3, 4), -1, surface.rest_weights)
+        nodes, joints = np.unique(surface.nodes, return_inverse=True)
+        places = [self._place(node) for node in nodes.tolist()]
+        there = np.array([node for node, _ in places], np.int64)[joints]
+        local = np.array([local for _, local in places]).reshape(-1, 3, 4)
+        carried = (local != mesh_space.IDENTITY).any(axis=(1, 2))[joints]
+        bind = surface.bind.copy()
+        bind[carried] = matrix.multiply(local[joints[carried]], bind[carried])
+        return Binding(there, bind, -1, surface.rest_weights)
 
     def _rigid(self, surface: Surface, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         node = int(self.nodes[instance.node])
@@ -199,21 +203,21 @@ class _SceneMatcher:
 
     def _skinned(self, surface: Surface, skin: Skin, instance: MeshInstance, partner: MeshInstance | None) -> Binding:
         """Joints of a skinned surface: of the skin that has most of them, the others by their nodes."""
-        plain = self.by_nodes(surface)
         skins = self._skins if partner is None or partner.skin is None else (partner.skin,)
         matched = [(new, self._joints(skin, new)) for new in skins]
         if not matched:
-            return plain
+            return self.by_nodes(surface)
         new, joints = max(matched, key=lambda each: int((each[1] >= 0).sum()))
         found = joints >= 0
         guess = None if partner is None else mesh_space.from_points(instance.mesh.positions, partner.mesh.positions)
-        space = mesh_space.from_binds(skin.inverse_bind[found], new.inverse_bind[joints[found]], guess)
-        nodes, bind = plain.nodes.copy(), plain.bind.copy()
-        nodes[found] = new.joints[joints[found]]
-        bind[found] = new.inverse_bind[joints[found]]
+        matched_bind = new.inverse_bind[joints[found]]
+        space = mesh_space.from_binds(skin.inverse_bind[found], matched_bind, guess)
         if space is not mesh_space.IDENTITY:
-            bind[found] = matrix.multiply(bind[found], space)
-        return Binding(nodes, bind, -1, surface.rest_weights)
+            matched_bind = matrix.multiply(matched_bind, space)
+        carried = self.by_nodes(surface)
+        carried.nodes[found] = new.joints[joints[found]]
+        carried.bind[found] = matched_bind
+        return carried
 
     def _joints(self, old: Skin, new: Skin) -> Ints:
         """For each joint of a skin (J,) its index in another skin's list, −1 without one."""

@@ -49,9 +49,10 @@ def bone_tips(above: Ints) -> tuple[Ints, Ints]:
     bone_tips([-1, 0, 0]) → [0, 2, 3, 4], [1, 2, 1, 2]
     """
     joints = np.arange(len(above))
-    leaves = np.setdiff1d(joints, above)
-    owners = np.concatenate((above[above >= 0], leaves))
-    tips = np.concatenate((joints[above >= 0], leaves))
+    children = joints[above >= 0]
+    leaves = np.flatnonzero(np.bincount(above[children], minlength=len(above)) == 0)
+    owners = np.concatenate((above[children], leaves))
+    tips = np.concatenate((children, leaves))
     start = np.concatenate(([0], np.cumsum(np.bincount(owners, minlength=len(above)))))
     return start, tips[np.argsort(owners, kind="stable")]
 
