@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anim.arrays import AnyArray, Bools, Floats
+from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.caches.transforms import resample, up_axis
 from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import stick_mesh
@@ -29,6 +29,9 @@ MAX_LOADED_BYTES = 48_000_000  # positions of frames that are baked once for all
 NUM_FRAMING_FRAMES = 48  # frames of the whole motion for the framing of the camera
 MIN_FRAMING_FRAMES = 8  # of these, of meshes with MAX_FRAMING_VERTICES in few frames
 MAX_FRAMING_VERTICES = 4_000_000  # positions of all framing frames
+STICK_CORNERS = np.array([0, 3, 2, 1, 7, 13])  # of 24: start, end and the ring
+STICK_FACES = np.array([[0, 3 + i, 2 + i, 1, 2 + i, 3 + i] for i in range(3)] + [[0, 2, 5, 1, 5, 2]]).ravel()
+CORNERS_PER_STICK_VERTEX = 4  # of a stick's faces at each vertex: thousands are framed by few frames
 STICK_SCALE = 1.9  # width relative to the sticks in files
 MAX_STICK_RATIO = 1.5  # relative to the median width, so that links to distant helper joints don't hide others
 
@@ -77,6 +80,7 @@ def of_document(
     scene = _visible(whole_scene, nodes)
     is_drawn = any(len(instance.mesh.faces) for instance in whole_scene.instances)
     materials = MaterialReader(document, resolve, note) if textures and is_drawn else None
+    count = scene.vertex_count if is_drawn else CORNERS_PER_STICK_VERTEX * scene.vertex_count
     known = reader.clips(document)
     chosen = [(i, known[i]) for i in clips] or [(-1, Clip("", ()))]
     moving = [clip for _, clip in chosen if clip.tracks]
@@ -87,14 +91,15 @@ def of_document(
     bakers: dict[str, Baker] = {}
     for number, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
-        times, path = when.times(start, end), _framing_times(start, end, sum(map(_num_vertices, scene.instances)))
+        times, path = when.times(start, end), _framing_times(start, end, count)
         if not len(times):
             continue
         for method in methods or ("lbs",):
             if method not in bakers:
                 bakers[method] = prepare_bake(scene, method=method, rigid=True)
             cache = _load_small(bakers[method].bake(clip, times=times))
-            whole = _load_small(bakers[method].bake(clip, times=path))
+            is_same = np.array_equal(times, path)
+            whole = cache if is_same else _load_small(bakers[method].bake(clip, times=path))
             if not found and materials is not None:
                 surface, colors = materials.surface(cache)
             elif not found:
@@ -165,8 +170,8 @@ def build_strips(
                 shot.clip,
             )
         )
-        points += [_framing_points(each, camera_path) for each in (shot.path, shot.cache)]
-    ground = min(ground_height(each, shot.body) for shot in shots for each in (shot.path, shot.cache))
+        points += [_framing_points(each, camera_path) for each in dict.fromkeys((shot.path, shot.cache))]
+    ground = min(ground_height(each, shot.body) for shot in shots for each in dict.fromkeys((shot.path, shot.cache)))
     return found, Extent(np.concatenate(points), ground)
 
 
@@ -203,7 +208,7 @@ def _visible(scene: Scene, nodes: Collection[int] | None) -> Scene:
     mesh, skin = stick_mesh(scene.skeleton, _ends(scene.skeleton))
     if not len(mesh.positions):
         raise NotFoundError("has neither a mesh nor joints to draw")
-    return Scene(scene.skeleton, (MeshInstance(0, _widen_sticks(mesh), skin, np.zeros(0)),))
+    return Scene(scene.skeleton, (MeshInstance(0, _merge_corners(_widen_sticks(mesh)), skin, np.zeros(0)),))
 
 
 def _widen_sticks(mesh: Mesh) -> Mesh:
@@ -215,6 +220,17 @@ def _widen_sticks(mesh: Mesh) -> Mesh:
     wanted = STICK_SCALE * np.minimum(radius, MAX_STICK_RATIO * np.median(radius))
     bodies[:, ring] = middle + wanted / radius * (bodies[:, ring] - middle)
     return replace(mesh, positions=bodies.reshape(-1, 3))
+
+
+def _merge_corners(mesh: Mesh) -> Mesh:
+    """The same sticks on six vertices each, shared by their faces: pictures need no normals of vertices."""
+    rows: Ints = np.arange(0, len(mesh.positions), 24)[:, None]
+    chosen = (rows + STICK_CORNERS).ravel()
+    faces = (rows // 24 * len(STICK_CORNERS) + STICK_FACES).reshape(-1, 3)
+    none = np.zeros((0, len(chosen), 3))
+    return Mesh(
+        mesh.name, mesh.positions[chosen], faces, mesh.joints[chosen], mesh.weights[chosen], none, mesh.rest_weights
+    )
 
 
 def _ends(skeleton: Skeleton) -> frozenset[int]:
@@ -233,10 +249,6 @@ def _framing_times(start: float, end: float, vertices: int) -> Floats:
     """Times of the whole motion for the camera; fewer of many vertices, for memory."""
     count = min(max(MAX_FRAMING_VERTICES // max(vertices, 1), MIN_FRAMING_FRAMES), NUM_FRAMING_FRAMES)
     return np.linspace(start, end, count) if end > start else np.array([start])
-
-
-def _num_vertices(instance: MeshInstance) -> int:
-    return len(instance.mesh.positions)
 
 
 def _framing_points(cache: VertexCache, camera_path: root_path.RootPath | None) -> AnyArray:

@@ -13,6 +13,7 @@ MAX_BATCH_ROWS = 1 << 20  # rows of triangles drawn at a time
 MAX_BATCH_PIXELS = 1 << 16  # pixels of these rows at a time: temporary arrays fit into the processor's cache
 MAX_OVERDRAW = 32  # triangles per pixel, on average, above which equal ones are drawn once
 EDGE_TOLERANCE_PX = 1e-9  # pixels; tolerance of the inside test, to avoid gaps between adjacent triangles
+CHECKSUM_FACTORS = np.cumprod(np.full(9, 0x9E3779B97F4A7C15, np.uint64))  # odd ones: bits of a triangle's 9 numbers
 MIN_AREA_PX2 = 1e-12  # pixels²; triangles of less area are seen edge-on
 
 # (triangles (S,), columns (S,), rows (S,) of pixels) → whether each is drawn there (S,)
@@ -29,10 +30,12 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
     """
     seen: Ints = np.full(height * width, -1, np.int64)
     nearest = np.full(height * width, -np.inf)
-    shares, near, chosen = _planes(corners)
-    if alpha_test is None and _area(corners[chosen]) > MAX_OVERDRAW * height * width:
-        last = _last_of_equal(corners[chosen])
-        shares, near, chosen = shares[last], near[last], chosen[last]
+    if alpha_test is None and _area(corners) > MAX_OVERDRAW * height * width:
+        distinct = _last_of_equal(corners)
+        shares, near, chosen = _planes(corners[distinct])
+        chosen = distinct[chosen]
+    else:
+        shares, near, chosen = _planes(corners)
     y = corners[chosen, :, 1]
     first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
     last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
@@ -50,9 +53,14 @@ def _area(corners: Floats) -> float:
 
 
 def _last_of_equal(corners: Floats) -> Ints:
-    """Indices, increasing, of triangles that equal no later one: of equal ones the last is seen."""
-    rows = np.ascontiguousarray(corners[::-1].reshape(len(corners), 9)).view("V72")[:, 0]
-    _, first = np.unique(rows, return_index=True)
+    """Indices, increasing, of triangles that equal no later one: of equal ones the last is seen.
+
+    They are found by a checksum, and all are kept where it is the same for different ones.
+    """
+    rows = np.ascontiguousarray(corners[::-1].reshape(len(corners), 9)).view(np.uint64)
+    _, first, owner = np.unique(rows @ CHECKSUM_FACTORS, return_index=True, return_inverse=True)
+    if not (rows == rows[first[owner]]).all():
+        return np.arange(len(corners))
     return np.sort(len(corners) - 1 - first)
 
 

@@ -10,12 +10,15 @@ import pytest
 
 from anim.caches.transforms.up_axis import to_up_axis
 from anim.errors import NotFoundError, RangeError
+from anim.exchange.stick_mesh import stick_mesh
 from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
 from anim.show.filmstrip import clips, renderer
 from anim.show.filmstrip import filmstrip as filmstrip_module
 from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
 from anim.show.filmstrip.frame_selection import FrameSelection
+from anim.skinning.bake import Baker
+from tests.calls import count_calls
 from tests.clips import skeleton
 from tests.files import opened_fixture
 
@@ -89,10 +92,29 @@ def test_a_skeleton_without_a_mesh_is_drawn_as_sticks() -> None:
 def test_a_long_stick_is_no_wider_than_half_more_than_the_middle_one() -> None:
     joints = skeleton([-1, 0, 1, 2, 0], translation=[[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0], [0, 0.1, 0], [1, 0, 0]])
     (instance,) = clips._visible(Scene(joints, ()), None).instances
-    bodies = instance.mesh.positions.reshape(-1, 24, 3)
+    bodies = instance.mesh.positions.reshape(-1, 6, 3)  # start, end and four of the ring
     assert np.ptp(bodies, axis=1).max() == pytest.approx(1)
-    widths = np.linalg.norm(bodies[:, 1] - bodies[:, 13], axis=1)
+    widths = np.linalg.norm(bodies[:, 3] - bodies[:, 5], axis=1)
     assert widths.max() == pytest.approx(1.5 * np.median(widths))
+
+
+def test_faces_of_sticks_share_their_corners() -> None:
+    """A quarter of the vertices of the sticks in files, in the same places."""
+    joints = skeleton([-1, 0, 1, 0], translation=[[0, 0, 0], [0, 0.3, 0], [0.1, 0.2, 0], [0.2, 0, 0.1]])
+    whole, _ = stick_mesh(joints, frozenset({2, 3}))
+    merged = clips._merge_corners(whole)
+    assert len(merged.positions) * 4 == len(whole.positions)
+    assert np.array_equal(merged.positions[merged.faces], whole.positions[whole.faces])
+    assert np.array_equal(merged.joints[merged.faces], whole.joints[whole.faces])
+
+
+def test_the_frames_of_the_camera_are_not_baked_again_if_they_are_those_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clips, "NUM_FRAMING_FRAMES", 8)
+    counted = count_calls(monkeypatch, Baker, "bake")
+    (same,) = clips.of_document(opened_fixture("arm"), [0], (), FrameSelection(count=8))
+    assert (len(counted), same.path) == (1, same.cache)
+    clips.of_document(opened_fixture("arm"), [0], (), FrameSelection(count=7))
+    assert len(counted) == 3
 
 
 def test_a_cache_with_z_up_stands() -> None:

@@ -49,3 +49,10 @@ def test_equal_triangles_are_drawn_once_where_they_are_many(monkeypatch: pytest.
     assert set(np.unique(found)) <= {-1, 597, 598, 599}
     monkeypatch.setattr(rasterizer, "MAX_OVERDRAW", 10**6)
     assert np.array_equal(found, rasterizer.visible_faces(corners, width=40, height=30))
+
+
+def test_different_triangles_with_one_checksum_are_all_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    corners = np.random.default_rng(6).uniform(0, 40, (3, 3, 3))[[0, 1, 0, 2]]
+    assert rasterizer._last_of_equal(corners).tolist() == [1, 2, 3]
+    monkeypatch.setattr(rasterizer, "CHECKSUM_FACTORS", np.zeros(9, np.uint64))
+    assert rasterizer._last_of_equal(corners).tolist() == [0, 1, 2, 3]
