@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,6 +13,7 @@ from anim.maths import hermite, quaternion
 from anim.model import Interpolation, ValueKind
 
 MIN_QUATERNION_COMPONENT = 1e-9  # a quaternion whose largest component is below this has no direction
+MAX_MIXED_VALUES = 1 << 18  # interpolated at a time: a dozen temporary arrays of them
 
 
 class Keys(Protocol):
@@ -88,9 +90,32 @@ def interpolate(
     is_early = is_rotation and interpolation is not Interpolation.CUBICSPLINE and len(values) < len(place.left)
     if is_early:  # once per key, not per time
         values = quaternion.normalize(values)
-    start = values[place.left]
     if interpolation is Interpolation.STEP or not place.u.any():  # all at keys, whose values are exact
+        start = values[place.left]
         return quaternion.normalize(start) if is_rotation and not is_early else start
+    size = place.u[:1].size * math.prod(values.shape[1:])  # values of one time
+    count = max(MAX_MIXED_VALUES // max(size, 1), 1)
+    if len(place.u) <= count:
+        return _mix(place, values, tangents, interpolation, is_rotation=is_rotation, is_unit=is_early)
+    result = np.empty((*place.u.shape, *values.shape[1:]))
+    for first in range(0, len(result), count):
+        some = KeyInterval(*(part[first : first + count] for part in place))
+        mixed = _mix(some, values, tangents, interpolation, is_rotation=is_rotation, is_unit=is_early)
+        result[first : first + count] = mixed
+    return result
+
+
+def _mix(
+    place: KeyInterval,
+    values: Floats,
+    tangents: tuple[Floats, Floats] | None,
+    interpolation: Interpolation,
+    *,
+    is_rotation: bool,
+    is_unit: bool,
+) -> Floats:
+    """The values of splines and lines in key intervals. is_unit: whether rotations are normalized."""
+    start = values[place.left]
     shape = place.u.shape + (1,) * (values.ndim - 1)
     u, end = place.u.reshape(shape), values[place.right]
     if interpolation is Interpolation.CUBICSPLINE and tangents is not None:
@@ -99,7 +124,7 @@ def interpolate(
         result = hermite.evaluate(u, start, duration * leaving[place.left], end, duration * arriving[place.right])
         return _unit(result, start) if is_rotation else result
     if is_rotation:
-        a, b = (start, end) if is_early else (quaternion.normalize(start), quaternion.normalize(end))
+        a, b = (start, end) if is_unit else (quaternion.normalize(start), quaternion.normalize(end))
         return quaternion.slerp(a, b, u[..., 0])
     return start + u * (end - start)
 

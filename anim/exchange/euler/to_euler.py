@@ -206,8 +206,18 @@ def _interval_errors(
 ) -> Floats:
     """Error of linear curves (K, ..., 3) in each interval (K − 1, ...), rad; 0 at a jump without a float32 time inside.
 
-    sampled: gives the rotations (F, ..., 4) at times (F,).
+    sampled: gives the rotations (F, ..., 4) at times (F,). Many intervals are measured in blocks.
     """
+    found = []
+    for first in range(0, len(times) - 1, BLOCK_KEYS):
+        some = slice(first, first + BLOCK_KEYS + 1)
+        found.append(_block_errors(sampled, times[some], angles[some], order, frame))
+    return np.concatenate(found)
+
+
+def _block_errors(
+    sampled: Callable[[Floats], Floats], times: Floats, angles: Floats, order: str, frame: AxesConvention
+) -> Floats:
     at = times[:-1] + (times[1:] - times[:-1]) * ERROR_FRACTIONS[:, None]
     u = ERROR_FRACTIONS.reshape(-1, *[1] * angles.ndim)
     straight = angles[:-1] + (angles[1:] - angles[:-1]) * u

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from anim.arrays import Floats
 from anim.errors import UnsupportedError
 from anim.exchange.euler.convention import axis_names
 from anim.exchange.euler.curve import HANDLES, Curve, Mode
@@ -18,6 +19,10 @@ from anim.model.time_axis import merge_times
 KEY_COLUMNS = ("node", "channel", "time", "value")
 EXTRA_COLUMNS = ("interpolation", "in_tangent", "out_tangent", "in_weight", "out_weight")
 DECIMALS = 9  # decimals
+MAX_BLOCK_ROWS = 1 << 14
+MIN_ROUNDED_VALUES = 64  # fewer are rounded one by one
+MAX_SCALED = 1e11  # of values times 10^9: the product is exact to 1e-5
+MIN_FROM_HALF = 1e-3  # of such a product: nearer to the middle between two integers, decimal digits decide
 
 
 class _Column(NamedTuple):
@@ -38,7 +43,8 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
         raise UnsupportedError("a CSV has one order for all nodes", help="write .json or .bvh")
     if any(node.pivots is not NO_PIVOTS for node in motion.nodes):
         raise UnsupportedError("a CSV has no pivots", help="write .json")
-    out = io.StringIO()
+    data = io.BytesIO()  # a string would take four bytes per character
+    out = io.TextIOWrapper(data, "utf-8", errors="backslashreplace", newline="")  # a lone surrogate, valid in JSON
     out.write(f"# order={convention.order} frame={convention.frame} unit={convention.unit}\n")
     rows = csv.writer(out, lineterminator="\n")
     radians = convention.unit.radians
@@ -49,7 +55,8 @@ def write(motion: EulerMotion, convention: Convention) -> bytes:
     columns = [column for node in motion.nodes for column in _columns(node, 1 / radians)]
     straight = not columns or bool((np.concatenate([column.curve.modes for column in columns]) == Mode.LINEAR).all())
     (_write_frames if straight else _write_keys)(rows, columns)
-    return out.getvalue().encode(errors="backslashreplace")  # a lone surrogate, valid in JSON names
+    out.flush()
+    return data.getvalue()
 
 
 def _columns(node: EulerNode, per_radian: float) -> Iterator[_Column]:
@@ -66,12 +73,16 @@ def _write_frames(rows: Any, columns: list[_Column]) -> None:
     rows.writerow(["time", *(f"{column.node}.{column.channel}" for column in columns)])
     axes = dict.fromkeys(column.curve.time_axis for column in columns)
     times = merge_times(axes)
-    cells = [[_text(time)] + [""] * len(columns) for time in times.tolist()]
-    places = {axis: np.searchsorted(times, axis.times).tolist() for axis in axes}
-    for number, (_, _, curve, factor) in enumerate(columns, 1):
-        for place, value in zip(places[curve.time_axis], (curve.values * factor).tolist(), strict=True):
-            cells[place][number] = _text(value)
-    rows.writerows(cells)
+    for first in range(0, len(times), MAX_BLOCK_ROWS):  # texts of all rows take ten times the memory of their values
+        some = times[first : first + MAX_BLOCK_ROWS]
+        cells = [[text] + [""] * len(columns) for text in _texts(some)]
+        ends = {axis: np.searchsorted(axis.times, (some[0], np.nextafter(some[-1], np.inf))) for axis in axes}
+        places = {axis: np.searchsorted(some, axis.times[slice(*ends[axis])]).tolist() for axis in axes}
+        for number, (_, _, curve, factor) in enumerate(columns, 1):
+            axis = curve.time_axis
+            for place, text in zip(places[axis], _texts(curve.values[slice(*ends[axis])] * factor), strict=True):
+                cells[place][number] = text
+        rows.writerows(cells)
 
 
 def _write_keys(rows: Any, columns: list[_Column]) -> None:
@@ -86,6 +97,24 @@ def _write_keys(rows: Any, columns: list[_Column]) -> None:
         keys = zip(curve.times.tolist(), curve.values.tolist(), curve.modes.tolist(), *extra, strict=True)
         for time, value, mode, *cells in keys:
             rows.writerow([named[first], named[second], _text(time), _text(value), words[mode], *cells])
+
+
+def _texts(values: Floats) -> list[str]:
+    """The same as `_text` of each value (K,), which takes longer for many."""
+    if len(values) < MIN_ROUNDED_VALUES:
+        return [*map(_text, values.tolist())]
+    firsts = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+    different = values[firsts]
+    scaled = np.clip(different, -MAX_SCALED, MAX_SCALED) * 10**DECIMALS
+    rounded = np.rint(scaled) / 10**DECIMALS  # the nearest number to a decimal one, unless that is the wrong neighbor
+    is_clear = (np.abs(scaled) < MAX_SCALED) & (np.abs(scaled - np.floor(scaled) - 0.5) > MIN_FROM_HALF)
+    unclear = np.flatnonzero(~is_clear)
+    rounded[unclear] = [round(value, DECIMALS) for value in different[unclear].tolist()]
+    texts = [f"{value:.12g}" for value in (rounded + 0.0).tolist()]
+    if len(texts) == len(values):
+        return texts
+    counts = np.diff(np.append(firsts, len(values))).tolist()
+    return [text for text, count in zip(texts, counts, strict=True) for _ in range(count)]
 
 
 def _text(value: float) -> str:

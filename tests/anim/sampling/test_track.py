@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from anim.gltf.reading import reader
 from anim.model import Interpolation, Track, ValueKind
+from anim.sampling import track as sampling_track
 from anim.sampling.batch import batches
 from anim.sampling.track import find_interval, sample
 from tests.clips import CUBICSPLINE, STEP, about, track
@@ -209,3 +210,12 @@ def _unit(made: Track, value: list[float]) -> list[float]:
         return value
     length = math.sqrt(sum(x * x for x in value))
     return [x / length for x in value]
+
+
+@pytest.mark.parametrize("keyed", TRACKS.values(), ids=TRACKS)
+def test_many_times_are_mixed_in_blocks(keyed: Track, monkeypatch: pytest.MonkeyPatch) -> None:
+    for at in (AT[::60], AT):
+        whole = sample(keyed, at)
+        with monkeypatch.context() as patch:
+            patch.setattr(sampling_track, "MAX_MIXED_VALUES", 33)
+            np.testing.assert_array_equal(sample(keyed, at), whole)
