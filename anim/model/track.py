@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -133,6 +133,18 @@ class Track:
         name, storage = interpolation or self.interpolation, self.storage
         return Track(self.node, self.path, name, times, values, in_tangents, out_tangents, self.pointer, storage)
 
+    def on_node(self, node: int) -> Track:
+        """Return the same keys on another node, ≥ 0, for a track of a node's translation, rotation or scale.
+
+        Nothing is checked again: files have the same keys on thousands of nodes.
+        """
+        moved = object.__new__(Track)
+        for name in _COPIED:
+            object.__setattr__(moved, name, getattr(self, name))
+        object.__setattr__(moved, "node", node)
+        object.__setattr__(moved, "_digest", None)
+        return moved
+
     def __eq__(self, other: object) -> bool:
         """Return whether the other track has the same keys, target and storage."""
         if not isinstance(other, Track):
@@ -191,6 +203,9 @@ class Track:
         target = f"node={self.node}, {self.path}" if self.pointer is None else repr(self.pointer)
         span = f"start_s={self.times[0]:.6g}, end_s={self.times[-1]:.6g}"
         return f"Track({target}, {self.interpolation}, keys={len(self.times)}, {span})"
+
+
+_COPIED = tuple(each.name for each in fields(Track) if each.init and each.name != "node")
 
 
 def _same(one: Floats | None, other: Floats | None) -> bool:

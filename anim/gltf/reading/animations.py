@@ -23,7 +23,8 @@ FRACTIONS = (5120, 5121, 5122, 5123)  # component types allowed for normalized r
 class Reader:
     """Reader of one document's tracks.
 
-    Tracks on one input accessor share one time axis; equal channels, of many clips, share one track.
+    Tracks on one input accessor share one time axis; equal channels, of many clips, share one track; keys on many nodes
+    are read and checked once.
     """
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
@@ -33,6 +34,7 @@ class Reader:
         self._time_axes: dict[int, TimeAxis] = {}
         self._values: dict[int, Floats] = {}
         self._tracks: dict[tuple[object, ...], Track] = {}
+        self._of_any_node: dict[tuple[object, ...], Track] = {}
 
     def track(self, animation: Json, number: int) -> Track | None:
         """Return a channel of `animation` as a track, None without a supported target."""
@@ -41,12 +43,18 @@ class Reader:
         if found is None:
             return None
         sampler = animation["samplers"][channel["sampler"]]
-        key = (found, sampler["input"], sampler["output"], sampler.get("interpolation"))
-        if key in self._tracks:
-            return self._tracks[key]
+        keys = sampler["input"], sampler["output"], sampler.get("interpolation")
+        if (found, keys) in self._tracks:
+            return self._tracks[found, keys]
         node, path, address = found
+        alike = self._of_any_node.get((path, keys)) if address is None else None
+        if alike is not None and node is not None:
+            return self._tracks.setdefault((found, keys), alike.on_node(node))
         try:
-            return self._tracks.setdefault(key, self._track(sampler, node, path, address))
+            track = self._track(sampler, node, path, address)
+            if address is None and path in NUM_COMPONENTS:  # others depend on the node
+                self._of_any_node[path, keys] = track
+            return self._tracks.setdefault((found, keys), track)
         except AnimError as error:
             if isinstance(error, RangeError | ShapeError):  # caused by the file, not by a caller
                 error = FormatError(error.problem, where=error.where, help=error.help)

@@ -12,9 +12,11 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError, check_type
 from anim.gltf.document import Document, Json, copy_json, json_array
-from anim.gltf.meshopt.storage import EncodedTrack, FilteredValues, check_extension
+from anim.gltf.meshopt.storage import EncodedTrack, check_extension
 from anim.gltf.reading import reader
 from anim.gltf.reading.node_matrix import expand_matrices
 from anim.gltf.validation import channel_targets
@@ -96,7 +98,7 @@ class _ContentPool:
         self.sources: list[set[int]] = []  # for each content, the accessors of the samplers that it replaces
         self._indices: dict[AccessorData, int] = {}
         self._time_axes: dict[TimeAxis, int] = {}
-        self._values: dict[tuple[bytes, FilteredValues | None], int] = {}
+        self._values: dict[tuple[object, ...], int] = {}
 
     def _add(self, content: AccessorData) -> int:
         index = self._indices.get(content)
@@ -109,8 +111,9 @@ class _ContentPool:
         return index
 
     def values(self, track: Track) -> int:
-        """The pending index of a track's values; those of equal tracks are encoded once."""
-        key = track.digest, track.codes if isinstance(track, EncodedTrack) else None
+        """The pending index of a track's values; equal values, on whatever nodes, are encoded once."""
+        codes = track.codes if isinstance(track, EncodedTrack) else None
+        key = track.path, track.interpolation, track.storage, codes, track.values.shape, _value_digest(track)
         if key not in self._values:
             self._values[key] = self._add(encoding.values(track))
         return self._values[key]
@@ -121,6 +124,16 @@ class _ContentPool:
         if axis not in self._time_axes:
             self._time_axes[axis] = self._add(encoding.times(axis))
         return self._time_axes[axis]
+
+
+def _value_digest(track: Track) -> bytes:
+    import hashlib  # loads OpenSSL
+
+    digest = hashlib.blake2b(digest_size=16)
+    for numbers in (track.values, track.in_tangents, track.out_tangents):
+        if numbers is not None:
+            digest.update(np.ascontiguousarray(numbers).data)
+    return digest.digest()
 
 
 def _replace_animation(json: Json, animation: Json, clip: Clip, number: int, pool: _ContentPool) -> Json:
