@@ -36,6 +36,8 @@ def merge_axes(keep: Bools, key_bytes: Floats, *, axis_bytes: float, time_bytes:
     for i, row in enumerate(keep):
         groups.setdefault(row.tobytes(), []).append(i)
     members = list(groups.values())
+    if len(members) == 1:
+        return [SharedAxis(keep[0], tuple(members[0]))]
     sets = np.array([keep[m[0]] for m in members], np.float64)
     width = np.array([key_bytes[m].sum() for m in members])
     count = sets.sum(axis=1)
