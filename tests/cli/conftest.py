@@ -12,6 +12,7 @@ import pytest
 import fixtures
 from cli import main
 from tests.cli.running import Run, built
+from tests.textured import textured
 
 Call = Callable[..., Run]
 Find = Callable[[str], Path]  # `asset` and `bad_input` of tests/conftest.py
@@ -73,3 +74,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "noop.glb").write_bytes(built("noop"))
     (tmp_path / "crowd" / "arm 1.glb").write_bytes(built("arm"))
     return tmp_path
+
+
+@pytest.fixture
+def textured_path(tmp_path: Path) -> Path:
+    """A skinned mesh with materials, images and everything that a bake must keep."""
+    path = tmp_path / "textured.glb"
+    path.write_bytes(textured())
+    return path

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import json as jsonlib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from anim.arrays import Ints
-from anim.gltf.document import Document, copy_json
+from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.gltf.reading.accessors import Accessors
 from anim.measure.error.surface import diagonal
-from anim.model import Mesh
-from fixtures.broken import pieces
 from tests.cli.conftest import Call, Find
 from tests.cli.running import help_line, refusal, stated_length
-from tests.files import glb_of, mark_slow, opened, opened_fixture, opened_path
+from tests.files import glb_of, mark_slow, opened_path
 from tests.judge import needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
-from tests.textured import UNKNOWN, looks, textured
+from tests.textured import UNKNOWN, looks
 
 ASSETS = [
     pytest.param("Fox.glb", "Survey", marks=pytest.mark.slow),
@@ -33,25 +27,18 @@ ASSETS = [
 FLOAT_ERROR_PER_DIAGONAL = 1e-6  # of sums of targets, which players compute in float32
 
 
-@pytest.fixture
-def source(tmp_path: Path) -> Path:
-    path = tmp_path / "textured.glb"
-    path.write_bytes(textured())
-    return path
-
-
-def baked(call: Call, source: Path, *options: str) -> Document:
-    out = source.with_name("out.glb")
-    run = call("bake", source, out, *options)
+def baked(call: Call, textured_path: Path, *options: str) -> Document:
+    out = textured_path.with_name("out.glb")
+    run = call("bake", textured_path, out, *options)
     assert run.code == 0, run.err
     return opened_path(out)
 
 
 @pytest.mark.parametrize("layout", ["morph", "flip-scale", "flip-visibility"])
 @pytest.mark.parametrize("space", ["world", "mesh"])
-def test_only_vertices_change(call: Call, source: Path, layout: str, space: str) -> None:
-    document = baked(call, source, "--clip", "bend", "--layout", layout, "--space", space)
-    before, after = looks(opened_path(source)), looks(document)
+def test_only_vertices_change(call: Call, textured_path: Path, layout: str, space: str) -> None:
+    document = baked(call, textured_path, "--clip", "bend", "--layout", layout, "--space", space)
+    before, after = looks(opened_path(textured_path)), looks(document)
     pages = after["meshes"][3:]
     after["meshes"] = after["meshes"][:3]
     assert after == before
@@ -62,51 +49,53 @@ def test_only_vertices_change(call: Call, source: Path, layout: str, space: str)
     assert set(attributes) == {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0", "_WEAR"}
 
 
-def test_nodes_keep_their_indices_and_names(call: Call, source: Path) -> None:
-    nodes = opened_path(source).json["nodes"]
-    json = baked(call, source, "--clip", "bend").json
+def test_nodes_keep_their_indices_and_names(call: Call, textured_path: Path) -> None:
+    nodes = opened_path(textured_path).json["nodes"]
+    json = baked(call, textured_path, "--clip", "bend").json
     assert [each.get("name") for each in json["nodes"]] == [each.get("name") for each in nodes]
     assert json["nodes"][4] == {"name": "body", "mesh": 0, "extras": {"keep": [1]}}
     assert json["nodes"][6] == nodes[6]
     assert json["scenes"] == [{"name": "stage", "nodes": [0, 4]}]
 
 
-def test_channels_that_move_something_stay(call: Call, source: Path) -> None:
+def test_channels_that_move_something_stay(call: Call, textured_path: Path) -> None:
     """The camera is below the joints, so their channels matter; without it they move nothing."""
-    targets = [each["target"] for each in baked(call, source, "--clip", "bend").json["animations"][0]["channels"]]
+    targets = [
+        each["target"] for each in baked(call, textured_path, "--clip", "bend").json["animations"][0]["channels"]
+    ]
     assert targets[0] == {"node": 4, "path": "weights"}
     assert targets[1:] == [{"node": 2, "path": "rotation"}, {"node": 5, "path": "translation"}]
-    document = opened_path(source)
+    document = opened_path(textured_path)
     del document.json["nodes"][3]["camera"]
-    source.write_bytes(glb_of(document))
-    json = baked(call, source, "--clip", "bend").json
+    textured_path.write_bytes(glb_of(document))
+    json = baked(call, textured_path, "--clip", "bend").json
     assert [each["target"]["node"] for each in json["animations"][0]["channels"]] == [4, 5]
     assert len(json["animations"]) == 1
     assert json["animations"][0]["name"] == "bend"
     assert json["animations"][0]["extras"] == {"clip": "bend"}
-    json = baked(call, source, "--clip", "bend", "--keep-skeleton").json
+    json = baked(call, textured_path, "--clip", "bend", "--keep-skeleton").json
     assert [each["target"]["node"] for each in json["animations"][0]["channels"]] == [4, 2, 5]
     assert len(json["skins"]) == 1
 
 
-def test_normals_are_baked_where_a_material_is_lit(call: Call, source: Path) -> None:
+def test_normals_are_baked_where_a_material_is_lit(call: Call, textured_path: Path) -> None:
     def names(*options: str) -> set[str]:
-        primitive = baked(call, source, "--clip", "bend", *options).json["meshes"][0]["primitives"][0]
+        primitive = baked(call, textured_path, "--clip", "bend", *options).json["meshes"][0]["primitives"][0]
         return set(primitive["attributes"]) & {"NORMAL", "TANGENT"} | set(primitive["targets"][0])
 
     assert names() == {"POSITION", "NORMAL", "TANGENT"}
     assert names("--no-normals") == {"POSITION"}
     assert names("--no-vertex-tangents") == {"POSITION", "NORMAL"}
-    document = opened_path(source)
+    document = opened_path(textured_path)
     for material in document.json["materials"]:
         material.setdefault("extensions", {})["KHR_materials_unlit"] = {}
-    source.write_bytes(glb_of(document))
+    textured_path.write_bytes(glb_of(document))
     assert names() == {"POSITION"}
 
 
-def test_other_meshes_stay_unless_meshes_are_selected(call: Call, source: Path) -> None:
+def test_other_meshes_stay_unless_meshes_are_selected(call: Call, textured_path: Path) -> None:
     def meshes(*options: str) -> list[str]:
-        json = baked(call, source, "--clip", "bend", *options).json
+        json = baked(call, textured_path, "--clip", "bend", *options).json
         return [json["meshes"][each["mesh"]]["name"] for each in json["nodes"] if "mesh" in each]
 
     assert meshes() == ["strip", "flag", "dust"]
@@ -126,65 +115,65 @@ def test_the_data_of_meshes_that_are_left_out_is_gone(call: Call, asset: Find, t
         assert errors(validate(out.read_bytes())) == []
 
 
-def test_meshes_stay_if_an_unknown_extension_may_name_them(call: Call, source: Path) -> None:
-    document = opened_path(source)
+def test_meshes_stay_if_an_unknown_extension_may_name_them(call: Call, textured_path: Path) -> None:
+    document = opened_path(textured_path)
     document.json["extensions"][UNKNOWN]["mesh"] = 2
-    source.write_bytes(glb_of(document))
-    assert len(baked(call, source, "--clip", "bend", "--mesh", "strip").json["meshes"]) == 3
+    textured_path.write_bytes(glb_of(document))
+    assert len(baked(call, textured_path, "--clip", "bend", "--mesh", "strip").json["meshes"]) == 3
 
 
-def test_a_bake_of_a_range(call: Call, source: Path) -> None:
-    out = source.with_name("out.npz")
-    assert call("bake", source, out, "--clip", "bend", "--from", "0.2", "--to", "0.75").code == 0
+def test_a_bake_of_a_range(call: Call, textured_path: Path) -> None:
+    out = textured_path.with_name("out.npz")
+    assert call("bake", textured_path, out, "--clip", "bend", "--from", "0.2", "--to", "0.75").code == 0
     assert np.load(out)["times"].tolist() == pytest.approx([0.2, 0.25, 0.5, 0.75])
-    assert call("bake", source, out, "--clip", "bend", "--from", "0.5", "--fps", "8").code == 0
+    assert call("bake", textured_path, out, "--clip", "bend", "--from", "0.5", "--fps", "8").code == 0
     assert np.load(out)["times"].tolist() == pytest.approx([0.5, 0.625, 0.75, 0.875, 1])
     assert "the clip goes from 0 s to 1 s" in refusal(
-        call("bake", source, source.with_name("x.glb"), "--clip", "bend", "--from", "3"), 2
+        call("bake", textured_path, textured_path.with_name("x.glb"), "--clip", "bend", "--from", "3"), 2
     )
-    document = baked(call, source, "--clip", "bend", "--from", "0.2", "--to", "0.75")
+    document = baked(call, textured_path, "--clip", "bend", "--from", "0.2", "--to", "0.75")
     (clip,) = reader.clips(document)
     assert {(round(float(each.times[0]), 6), round(float(each.times[-1]), 6)) for each in clip.tracks} == {(0.2, 0.75)}
 
 
-def test_a_range_beyond_the_clip_is_noted(call: Call, source: Path) -> None:
-    out = source.with_name("out.npz")
-    run = call("bake", source, out, "--clip", "bend", "--from", "-1", "--to", "2")
+def test_a_range_beyond_the_clip_is_noted(call: Call, textured_path: Path) -> None:
+    out = textured_path.with_name("out.npz")
+    run = call("bake", textured_path, out, "--clip", "bend", "--from", "-1", "--to", "2")
     assert run.code == 0
     assert "note: --from is -1 s, but clip 'bend' begins at 0 s" in run.err
     assert "note: --to is 2 s, but clip 'bend' ends at 1 s" in run.err
     assert np.load(out)["times"].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1])
-    many = call("bake", source, source.with_name("{clip}.npz"), "--from", "-1", "--to", "1").err
+    many = call("bake", textured_path, textured_path.with_name("{clip}.npz"), "--from", "-1", "--to", "1").err
     assert "clip 'bend' begins at 0 s, and 1 more" in many
     assert "--to" not in many
 
 
-def test_convert_cache_onto_is_bake(call: Call, source: Path) -> None:
-    baked(call, source, "--clip", "bend")
-    cache, onto = source.with_name("a.npz"), source.with_name("onto.glb")
-    assert call("bake", source, cache, "--clip", "bend", "--vertex-tangents").code == 0
-    assert call("convert-cache", cache, onto, "--onto", source, "--clip", "bend").code == 0
-    assert onto.read_bytes() == source.with_name("out.glb").read_bytes()
-    assert call("bake", source, source.with_name("a.pc2"), "--clip", "bend").code == 0
-    assert call("convert-cache", source.with_name("a.pc2"), onto, "--onto", source).code == 0
-    assert looks(opened_path(onto)) == looks(opened_path(source))
+def test_convert_cache_onto_is_bake(call: Call, textured_path: Path) -> None:
+    baked(call, textured_path, "--clip", "bend")
+    cache, onto = textured_path.with_name("a.npz"), textured_path.with_name("onto.glb")
+    assert call("bake", textured_path, cache, "--clip", "bend", "--vertex-tangents").code == 0
+    assert call("convert-cache", cache, onto, "--onto", textured_path, "--clip", "bend").code == 0
+    assert onto.read_bytes() == textured_path.with_name("out.glb").read_bytes()
+    assert call("bake", textured_path, textured_path.with_name("a.pc2"), "--clip", "bend").code == 0
+    assert call("convert-cache", textured_path.with_name("a.pc2"), onto, "--onto", textured_path).code == 0
+    assert looks(opened_path(onto)) == looks(opened_path(textured_path))
 
 
-def test_refusals_of_onto(call: Call, source: Path, fixture: Any) -> None:
-    cache, out = source.with_name("a.npz"), source.with_name("x.glb")
-    assert call("bake", source, cache, "--clip", "bend").code == 0
+def test_refusals_of_onto(call: Call, textured_path: Path, fixture: Any) -> None:
+    cache, out = textured_path.with_name("a.npz"), textured_path.with_name("x.glb")
+    assert call("bake", textured_path, cache, "--clip", "bend").code == 0
     run = call("convert-cache", cache, out, "--onto", fixture("arm"))
     assert "the cache has 36 vertices, the meshes of the source have 530" in refusal(run, 2)
     assert "in the order of the file" in help_line(run)
-    assert "--onto does not apply to .npz" in refusal(call("convert-cache", cache, "b.npz", "--onto", source), 2)
+    assert "--onto does not apply to .npz" in refusal(call("convert-cache", cache, "b.npz", "--onto", textured_path), 2)
     assert "--clip needs --onto" in refusal(call("convert-cache", cache, out, "--clip", "bend"), 2)
-    assert "--keep-skeleton does not apply" in refusal(call("bake", source, cache, "--keep-skeleton"), 2)
+    assert "--keep-skeleton does not apply" in refusal(call("bake", textured_path, cache, "--keep-skeleton"), 2)
 
 
-def test_at_most_256_targets(call: Call, source: Path, tmp_path: Path) -> None:
+def test_at_most_256_targets(call: Call, textured_path: Path, tmp_path: Path) -> None:
     random = np.random.default_rng(3)
     cache = tmp_path / "noise.npz"
-    assert call("bake", source, cache, "--clip", "bend").code == 0
+    assert call("bake", textured_path, cache, "--clip", "bend").code == 0
     with np.load(cache) as file:
         arrays = dict(file)
     arrays["times"] = np.arange(300.0)
@@ -211,17 +200,19 @@ def test_at_most_256_targets(call: Call, source: Path, tmp_path: Path) -> None:
         pytest.param(("--fps", "0.5"), marks=pytest.mark.slow),
     ],
 )
-def test_the_validator_finds_nothing_new(call: Call, source: Path, layout: str, options: tuple[str, ...]) -> None:
-    assert errors(validate(source.read_bytes())) == []
-    baked(call, source, "--clip", "bend", "--layout", layout, *options)
-    report = validate(source.with_name("out.glb").read_bytes())
+def test_the_validator_finds_nothing_new(
+    call: Call, textured_path: Path, layout: str, options: tuple[str, ...]
+) -> None:
+    assert errors(validate(textured_path.read_bytes())) == []
+    baked(call, textured_path, "--clip", "bend", "--layout", layout, *options)
+    report = validate(textured_path.with_name("out.glb").read_bytes())
     assert errors(report) == []
     assert report["issues"]["numWarnings"] == 0 or "--rigid" in options  # whose meshes have no tangents
 
 
 @needs_validator
-def test_quantized_targets_in_mesh_space(call: Call, source: Path) -> None:
-    document = baked(call, source, "--clip", "bend", "--quantize", "--space", "mesh")
+def test_quantized_targets_in_mesh_space(call: Call, textured_path: Path) -> None:
+    document = baked(call, textured_path, "--clip", "bend", "--quantize", "--space", "mesh")
     assert errors(validate(glb_of(document))) == []
     assert "KHR_mesh_quantization" in document.json["extensionsRequired"]
 
@@ -244,9 +235,9 @@ def test_real_files_keep_materials_images_and_texture_coordinates(
 @needs_judge
 @pytest.mark.parametrize(("name", "clip"), [*ASSETS, ("", "bend")])
 def test_three_shows_the_source_within_the_stated_error(
-    call: Call, asset: Find, source: Path, tmp_path: Path, name: str, clip: str
+    call: Call, asset: Find, textured_path: Path, tmp_path: Path, name: str, clip: str
 ) -> None:
-    path, out = asset(name) if name else source, tmp_path / "out.glb"
+    path, out = asset(name) if name else textured_path, tmp_path / "out.glb"
     run = call("bake", path, out, "--clip", clip, "--rigid", "--max-error", "0.01%")
     assert run.code == 0
     document = opened_path(path)
@@ -269,101 +260,11 @@ def test_images_beside_a_gltf_are_inside(call: Call, asset: Find, tmp_path: Path
     assert image[1] == asset("CesiumMan-gltf/CesiumMan_img0.jpg").read_bytes()
 
 
-def test_render_reads_a_flip_book_with_materials(call: Call, source: Path) -> None:
-    baked(call, source, "--clip", "bend", "--layout", "flip-visibility")
-    book, cache = source.with_name("out.glb"), source.with_name("a.npz")
+def test_render_reads_a_flip_book_with_materials(call: Call, textured_path: Path) -> None:
+    baked(call, textured_path, "--clip", "bend", "--layout", "flip-visibility")
+    book, cache = textured_path.with_name("out.glb"), textured_path.with_name("a.npz")
     assert call("convert-cache", book, cache).code == 0
-    assert call("bake", source, source.with_name("b.npz"), "--clip", "bend").code == 0
-    found, truth = (np.load(each)["positions"] for each in (cache, source.with_name("b.npz")))
+    assert call("bake", textured_path, textured_path.with_name("b.npz"), "--clip", "bend").code == 0
+    found, truth = (np.load(each)["positions"] for each in (cache, textured_path.with_name("b.npz")))
     assert found == pytest.approx(truth, abs=1e-6)
-    assert call("render", book, source.with_name("a.png"), "--frames", "2").code == 0
-
-
-def test_nothing_of_the_skin_is_left(call: Call, source: Path) -> None:
-    """Bytes of joints, weights, binds and unused clips are gone."""
-    document = baked(call, source, "--clip", "bend")
-    used = sum(each["byteLength"] for each in document.json["bufferViews"])
-    assert used >= document.json["buffers"][0]["byteLength"] - 3 * len(document.json["bufferViews"])
-    kinds = [(each["componentType"], each["type"]) for each in document.json["accessors"]]
-    assert (5121, "VEC4") not in kinds
-    assert (5126, "MAT4") not in kinds
-    assert opened(glb_of(document)).json == document.json
-
-
-@pytest.mark.parametrize("layout", ["flip-scale", "flip-visibility"])
-def test_pages_of_a_mesh_that_nodes_share_are_their_own(call: Call, tmp_path: Path, layout: str) -> None:
-    document = opened_fixture("morph_cube")
-    json = copy_json(document.json)
-    cube = next(node for node in json["nodes"] if "mesh" in node)
-    json["nodes"].append({"mesh": cube["mesh"], "translation": [5, 0, 0]})
-    json["scenes"][0]["nodes"].append(len(json["nodes"]) - 1)
-    path = tmp_path / "two.glb"
-    path.write_bytes(glb_of(replace(document, json=json)))
-    pages = baked(call, path, "--clip", "#0", "--layout", layout, "--fps", "2").json["nodes"]
-    meshes = [node["mesh"] for node in pages if "mesh" in node]
-    assert len(set(meshes)) == len(meshes) > 2
-
-
-@pytest.mark.parametrize("mode", [4, 5, 6])
-@pytest.mark.parametrize("layout", ["morph", "flip-scale"])
-def test_faces_of_a_mirrored_node_are_reversed(call: Call, tmp_path: Path, layout: str, mode: int) -> None:
-    """Players reverse the winding of such a node; its vertices are now on another one, in world space."""
-    path = tmp_path / "mirrored.glb"
-    document = opened_fixture("morph_cube")
-    json = copy_json(document.json)
-    cube = next(i for i, node in enumerate(json["nodes"]) if "mesh" in node)
-    for primitive in json["meshes"][json["nodes"][cube]["mesh"]]["primitives"]:
-        primitive["mode"] = mode
-    json["nodes"].append({"scale": [1, -1, 1], "children": [cube]})
-    json["scenes"] = [{"nodes": [len(json["nodes"]) - 1]}]
-    path.write_bytes(glb_of(replace(document, json=json)))
-    faces = meshes_of(opened_path(path))[0].faces
-    out = baked(call, path, "--clip", "#0", "--layout", layout)
-    found = next(mesh for mesh in meshes_of(out) if len(mesh.positions)).faces
-    assert oriented(found) == oriented(faces[:, ::-1])
-    assert oriented(meshes_of(baked(call, path, "--clip", "#0", "--space", "mesh"))[0].faces) == oriented(faces)
-    cache = tmp_path / "out.npz"
-    assert call("bake", path, cache, "--clip", "#0").code == 0
-    with np.load(cache) as arrays:
-        assert oriented(arrays["faces"]) == oriented(faces[:, ::-1])
-
-
-def meshes_of(document: Document) -> list[Mesh]:
-    return [instance.mesh for instance in reader.scene(document).instances]
-
-
-def oriented(faces: Ints) -> set[tuple[int, ...]]:
-    """The faces that are no lines, each from its smallest vertex on."""
-    rows = [row for row in faces.tolist() if len(set(row)) == 3]
-    return {tuple(row[(row.index(min(row)) + i) % 3] for i in range(3)) for row in rows}
-
-
-def test_interleaved_attributes_keep_whole_rows(call: Call, source: Path) -> None:
-    """three.js reads as many bytes as elements times the stride, from the row of the first element on."""
-    document = opened_path(source)
-    json = copy_json(document.json)
-    primitive = json["meshes"][0]["primitives"][0]["attributes"]
-    names = ("JOINTS_0", "TEXCOORD_0", "POSITION")
-    accessors = Accessors(document)
-    columns = [accessors.raw(primitive[name]) for name in names]
-    rows = np.concatenate(
-        [np.ascontiguousarray(each).view(np.uint8).reshape(len(each), -1) for each in columns], axis=1
-    )
-    start = len(document.buffers[0].data)
-    json["buffers"][0]["byteLength"] = start + rows.size
-    view = {"buffer": 0, "byteOffset": start, "byteLength": rows.size, "byteStride": rows.shape[1], "target": 34962}
-    json["bufferViews"].append(view)
-    offset = 0
-    for name, each in zip(names, columns, strict=True):
-        about = json["accessors"][primitive[name]]
-        about |= {"bufferView": len(json["bufferViews"]) - 1, "byteOffset": offset}
-        offset += each[0].nbytes
-    blob = bytes(document.buffers[0].data) + rows.tobytes()
-    source.write_bytes(pieces.glb(jsonlib.dumps(json).encode(), blob))
-    out = baked(call, source, "--clip", "bend").json
-    kept = out["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
-    about = out["accessors"][kept]
-    view = out["bufferViews"][about["bufferView"]]
-    stride = view["byteStride"]
-    assert stride == rows.shape[1]
-    assert about["byteOffset"] // stride * stride + about["count"] * stride <= view["byteLength"]
+    assert call("render", book, textured_path.with_name("a.png"), "--frames", "2").code == 0

@@ -91,7 +91,7 @@ class TrialRunner:
         known = self._results.get(name)
         if known is not None and (known.worst > 1 or known.size >= smaller_than):
             return None if known.size >= limit else replace(known, plan=plan)
-        shown = [part.copy() for part in self.source.local]
+        shown = [part.copy() if path in self._paths else part for path, part in enumerate(self.source.local)]
         keys = self._single_key(actions, constants, shown)
         for i, candidate in self._key_candidates(plan.rotation_target, axes, tolerances, shown[ROTATION]):
             keys[i] = candidate.stored

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.files import resolver
 from anim.gltf.document import Document, copy_json
 from anim.gltf.io import json_text
-from anim.gltf.io.uri import encode_data
 from anim.gltf.reading import reader
 from anim.gltf.writing import draco_decoding, writer
 from anim.operations.resample import resample
@@ -24,13 +20,12 @@ from anim.show.page import embedding
 from anim.show.page.embedding import embed
 from anim.skinning.bake import bake
 from tests import draco
+from tests.anim.show.page.embedded import MARKUP, content_of, edited
 from tests.files import opened, opened_fixture, opened_path
 from tests.judge import judge, needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate_many
 
 Find = Callable[[str], Path]
-Json = dict[str, Any]
-MARKUP = "</script><script>alert(1)</script>"
 LOADED_BY_THREE = (
     "AnimationPointer/24_animation_pointer.gltf",
     "BitmojiRun.glb",
@@ -38,12 +33,6 @@ LOADED_BY_THREE = (
     "CesiumMan-gltf/CesiumMan.gltf",
     "InterpolationTest.gltf",
 )
-
-
-def _png(color: tuple[int, int, int] = (200, 30, 30)) -> bytes:
-    file = io.BytesIO()
-    Image.new("RGB", (2, 2), color).save(file, "PNG")
-    return file.getvalue()
 
 
 def test_a_mesh_with_and_without_a_skin_becomes_two() -> None:
@@ -55,36 +44,6 @@ def test_a_mesh_with_and_without_a_skin_becomes_two() -> None:
     body, *others = (node["mesh"] for node in embedded["nodes"] if "mesh" in node)
     assert others == [len(json["meshes"])] * 2
     assert embedded["meshes"][others[0]]["primitives"] == embedded["meshes"][body]["primitives"]
-
-
-def _textured(*images: Json, textures: list[Json] | None = None, **more: Any) -> Document:
-    """The biped with a material of a base color and a normal texture, of images 0 and the last."""
-    document = opened_fixture("biped")
-    found = textures or [{"source": i} for i in range(len(images))]
-    surface = {"baseColorFactor": [1, 0, 0, 1], "baseColorTexture": {"index": 0}}
-    material = {"pbrMetallicRoughness": surface, "normalTexture": {"index": len(found) - 1}, "extras": {"aTexture": 1}}
-    json = {**copy_json(document.json), "images": list(images), "textures": found, **more}
-    json["materials"][0] = material
-    return replace(document, json=json)
-
-
-def _edited(name: str, **parts: Any) -> Document:
-    document = opened_fixture(name)
-    return replace(document, json={**copy_json(document.json), **parts})
-
-
-def _content(glb: bytes) -> Json:
-    return opened(glb).json
-
-
-def _image(glb: bytes, index: int) -> tuple[bytes, str]:
-    """Bytes and media type of an image."""
-    document = opened(glb)
-    image = document.json["images"][index]
-    assert set(image) <= {"bufferView", "mimeType", "name"}
-    view = document.json["bufferViews"][image["bufferView"]]
-    start = view.get("byteOffset", 0)
-    return document.buffers[view["buffer"]].data[start : start + view["byteLength"]].tobytes(), image["mimeType"]
 
 
 @needs_judge
@@ -109,7 +68,7 @@ def test_three_plays_meshopt_from_one_buffer(extension: str, tmp_path: Path) -> 
     document, squeezed = (writer.replace_clips(document, clips, extension=each) for each in ("", extension))
     for name, each in (("plain", document), ("squeezed", squeezed)):
         (tmp_path / f"{name}.glb").write_bytes(embed(each).glb)
-    assert extension in _content((tmp_path / "squeezed.glb").read_bytes())["extensionsUsed"]
+    assert extension in content_of((tmp_path / "squeezed.glb").read_bytes())["extensionsUsed"]
     assert judge(tmp_path / "plain.glb", tmp_path / "squeezed.glb").max_error < 1e-6
 
 
@@ -129,7 +88,7 @@ def test_pointers_at_nodes_and_meshes_play_in_three(tmp_path: Path) -> None:
     assert moved["weights"] == pytest.approx(np.hypot(0.25, 0.125), rel=1e-6)  # of deltas up to 0.25 m, both nodes
     assert moved["turn"] > 0.5
     assert moved["color"] == 0
-    plain = {each["name"]: [c["target"] for c in each["channels"]] for each in _content(found.glb)["animations"]}
+    plain = {each["name"]: [c["target"] for c in each["channels"]] for each in content_of(found.glb)["animations"]}
     assert plain["weights"] == [{"node": 0, "path": "weights"}, {"node": 1, "path": "weights"}]
     assert plain["turn"] == [{"node": 0, "path": "rotation"}]
     assert found.notes[0].startswith("3 tracks not shown: /materials/0/pbrMetallicRoughness/baseColorFactor, /nodes/1")
@@ -138,7 +97,7 @@ def test_pointers_at_nodes_and_meshes_play_in_three(tmp_path: Path) -> None:
 
 
 def test_weights_of_a_mesh_stay_a_pointer_where_a_node_has_its_own() -> None:
-    document = _edited("pointer")
+    document = edited("pointer")
     target = next(each for each in document.json["animations"] if each["name"] == "weights")["channels"][0]["target"]
     target["extensions"]["KHR_animation_pointer"]["pointer"] = "/meshes/0/weights"
     found = embed(document)
@@ -148,7 +107,7 @@ def test_weights_of_a_mesh_stay_a_pointer_where_a_node_has_its_own() -> None:
 
 def test_pointers_become_plain_channels() -> None:
     found = embed(opened_fixture("pointer"))
-    targets = [c["target"] for clip in _content(found.glb)["animations"] for c in clip["channels"]]
+    targets = [c["target"] for clip in content_of(found.glb)["animations"] for c in clip["channels"]]
     assert {"node": 0, "path": "rotation"} in targets
     assert {"node": 0, "path": "weights"} in targets
     assert len(reader.clips(opened(found.glb))) == len(reader.clips(opened_fixture("pointer")))
@@ -161,7 +120,7 @@ def test_one_buffer_holds_everything(name: str) -> None:
     found = embed(document)
     assert found == embed(opened_fixture(name)), "the same bytes twice"
     assert json_text.dump(document.json) == before, "the document given is unchanged"
-    content = _content(found.glb)
+    content = content_of(found.glb)
     assert [set(each) for each in content["buffers"]] == [{"byteLength"}]
     assert not found.notes
     for old, new in zip(reader.clips(document), reader.clips(opened(found.glb)), strict=True):
@@ -176,74 +135,10 @@ def test_the_validator_finds_no_error() -> None:
     assert not [each for report in validate_many(files) for each in errors(report)]
 
 
-def test_external_and_data_images_become_views() -> None:
-    red, blue = _png(), _png((0, 0, 250))
-    document = _textured({"uri": "skins/red%20one.png", "name": MARKUP}, {"uri": encode_data(blue, "image/png")})
-    found = embed(document, {"skins/red one.png": red}.__getitem__)
-    assert not found.notes
-    assert _image(found.glb, 0) == (red, "image/png")
-    assert _image(found.glb, 1) == (blue, "image/png")
-    assert _content(found.glb)["images"][0]["name"] == MARKUP
-    assert _content(found.glb)["materials"] == document.json["materials"]
-
-
-@pytest.mark.parametrize(
-    ("image", "words"),
-    [
-        ({"uri": "none.png"}, "'none.png'"),
-        ({"uri": "../secret.png"}, "leaves the file's folder"),
-        ({"uri": "/etc/passwd"}, "is absolute"),
-        ({"uri": "http://example.com/a.png"}, "has a scheme"),
-        ({"uri": "data:image/png;base64,=="}, "base64"),
-        ({"uri": "text.png"}, "is no PNG, JPEG, WebP or AVIF"),
-        ({}, "names no file"),
-    ],
-)
-def test_an_image_that_cannot_be_read_is_noted(image: Json, words: str, tmp_path: Path) -> None:
-    (tmp_path / "text.png").write_bytes(b"not a picture")
-    (tmp_path.parent / "secret.png").write_bytes(_png())
-    found = embed(_textured(image), resolver.CompanionFiles(tmp_path).open)
-    assert len(found.notes) == 1
-    assert found.notes[0].startswith("1 image not drawn: image 0 (")
-    assert words in found.notes[0]
-    content = _content(found.glb)
-    bare = {"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}, "extras": {"aTexture": 1}}
-    assert content["materials"][0] == bare
-    assert Image.open(io.BytesIO(_image(found.glb, 0)[0])).getpixel((0, 0)) == 255
-    assert b"uri" not in found.glb
-
-
-def test_many_missing_images_are_one_note() -> None:
-    found = embed(_textured(*({"uri": f"{i}.png"} for i in range(7)), textures=[{"source": 0}, {"source": 6}]))
-    assert len(found.notes) == 1, "images without a texture are not missed"
-    assert found.notes[0].startswith("2 images not drawn: image 0 ('0.png' lies beside the file, which has no folder)")
-
-
-def test_ktx2_is_not_drawn_unless_there_is_another_source() -> None:
-    ktx = encode_data(b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(80), "image/png")
-    basisu = {"extensions": {"KHR_texture_basisu": {"source": 0}}}
-    required = {"extensionsUsed": ["KHR_texture_basisu"], "extensionsRequired": ["KHR_texture_basisu"]}
-    alone = embed(_textured({"uri": ktx}, textures=[basisu], **required))
-    assert alone.notes == ["1 image not drawn: image 0 (is KTX2)"]
-    assert "extensionsRequired" not in _content(alone.glb)
-    png = {"uri": encode_data(_png(), "image/png")}
-    both = embed(_textured({"uri": ktx}, png, textures=[{**basisu, "source": 1}]))
-    assert not both.notes
-    assert _content(both.glb)["textures"] == [{"source": 1}]
-
-
-def test_broken_references_to_textures_are_dropped() -> None:
-    document = _textured(textures=[{"source": 0}, {"source": True}, {"source": 99}])
-    document.json["materials"][0]["emissiveTexture"] = {"index": 17}
-    found = embed(document)
-    assert found.notes == ["3 textures without an image: drawn without"]
-    assert set(_content(found.glb)["materials"][0]) == {"pbrMetallicRoughness", "extras"}
-
-
 def test_draco_is_decoded_or_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     document = draco.compressed(opened_fixture("biped"))
     found = embed(document)
-    content = _content(found.glb)
+    content = content_of(found.glb)
     assert not found.notes
     assert "KHR_draco_mesh_compression" not in str(content)
 
@@ -253,20 +148,20 @@ def test_draco_is_decoded_or_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(embedding, "decode_draco", refuse)
     found = embed(document)
     assert found.notes == ["1 mesh not drawn: Draco needs the package DracoPy"]
-    assert not any("mesh" in node for node in _content(found.glb)["nodes"])
+    assert not any("mesh" in node for node in content_of(found.glb)["nodes"])
     assert draco_decoding.decode_draco is not refuse
 
 
 def test_a_file_without_scenes_gets_one() -> None:
-    document = _edited("biped")
+    document = edited("biped")
     for key in ("scenes", "scene"):
         document.json.pop(key, None)
-    content = _content(embed(document).glb)
+    content = content_of(embed(document).glb)
     assert content["scenes"][content["scene"]]["nodes"]
 
 
 def test_tracks_outside_the_scene_have_no_target() -> None:
-    document = _edited("morph_cube")
+    document = edited("morph_cube")
     document.json["nodes"].append({"name": "elsewhere"})
     document.json["scenes"].append({"nodes": [len(document.json["nodes"]) - 1]})
     document.json["scene"] = len(document.json["scenes"]) - 1
@@ -276,33 +171,33 @@ def test_tracks_outside_the_scene_have_no_target() -> None:
         "1 mesh not shown: outside the default scene",
         f"{tracks} track{'s' * (tracks != 1)} not shown: of nodes outside the default scene",
     ]
-    assert not any("node" in c["target"] for clip in _content(found.glb)["animations"] for c in clip["channels"])
+    assert not any("node" in c["target"] for clip in content_of(found.glb)["animations"] for c in clip["channels"])
 
 
 def test_a_path_that_gltf_does_not_know_has_no_target() -> None:
-    document = _edited("morph_cube")
+    document = edited("morph_cube")
     document.json["animations"][0]["channels"].append({"sampler": 0, "target": {"node": 0, "path": "color"}})
     found = embed(document)
     assert not found.notes
-    assert _content(found.glb)["animations"][0]["channels"][-1]["target"] == {"path": "color"}
+    assert content_of(found.glb)["animations"][0]["channels"][-1]["target"] == {"path": "color"}
 
 
 def test_extensions_that_three_does_not_know_are_not_required() -> None:
-    document = _edited(
+    document = edited(
         "morph_cube",
         extensionsUsed=["ACME_light", "KHR_mesh_quantization"],
         extensionsRequired=["ACME_light", "KHR_mesh_quantization"],
     )
     found = embed(document)
     assert found.notes == ["shown without ACME_light, which the file requires"]
-    assert _content(found.glb)["extensionsRequired"] == ["KHR_mesh_quantization"]
+    assert content_of(found.glb)["extensionsRequired"] == ["KHR_mesh_quantization"]
 
 
 def test_names_with_markup_stay() -> None:
-    document = _edited("biped")
+    document = edited("biped")
     for each in (*document.json["nodes"], *document.json["animations"], *document.json["meshes"]):
         each["name"] = MARKUP
-    content = _content(embed(document).glb)
+    content = content_of(embed(document).glb)
     assert {each["name"] for key in ("nodes", "animations", "meshes") for each in content[key]} == {MARKUP}
 
 
@@ -319,13 +214,13 @@ def test_a_file_that_cannot_be_read_is_refused(asset: Find) -> None:
 
 def test_a_document_without_buffers_is_a_glb() -> None:
     document = opened(b'{"asset": {"version": "2.0"}, "buffers": []}')
-    assert _content(embed(document).glb) == {"asset": {"version": "2.0"}, "scenes": [{}], "scene": 0}
+    assert content_of(embed(document).glb) == {"asset": {"version": "2.0"}, "scenes": [{}], "scene": 0}
 
 
 @needs_judge
 @pytest.mark.parametrize("names", [("ab", "ab", "ab_1"), ("constructor", "toString"), ("a.b", "ab", "[a]b", "ab_2")])
 def test_nodes_that_three_takes_for_one_move_on_their_own(names: tuple[str, ...], tmp_path: Path) -> None:
-    document = _edited("biped")
+    document = edited("biped")
     for i, node in enumerate(document.json["nodes"]):
         node["name"] = names[i % len(names)]
     found = embed(document)
@@ -337,17 +232,17 @@ def test_nodes_that_three_takes_for_one_move_on_their_own(names: tuple[str, ...]
 
 
 def test_equal_names_alone_stay() -> None:
-    document = _edited("biped")
+    document = edited("biped")
     for node in document.json["nodes"]:
         node["name"] = "joint.001"
     found = embed(document)
     assert not found.notes
-    assert {node["name"] for node in _content(found.glb)["nodes"]} == {"joint.001"}
+    assert {node["name"] for node in content_of(found.glb)["nodes"]} == {"joint.001"}
 
 
 @needs_judge
 def test_nodes_that_share_a_mesh_of_several_primitives_morph_on_their_own(tmp_path: Path) -> None:
-    document = _edited("morph_cube")
+    document = edited("morph_cube")
     json = document.json
     json["meshes"][0]["primitives"].append(dict(json["meshes"][0]["primitives"][0]))
     json["nodes"].append({"mesh": 0, "name": "second", "translation": [5, 0, 0]})
@@ -361,7 +256,7 @@ def test_nodes_that_share_a_mesh_of_several_primitives_morph_on_their_own(tmp_pa
 
 
 def test_what_three_fails_on_is_left_out() -> None:
-    document = _edited("morph_cube", cameras=[{}], materials=[{"extensions": {"KHR_materials_unlit": {}}}, 3])
+    document = edited("morph_cube", cameras=[{}], materials=[{"extensions": {"KHR_materials_unlit": {}}}, 3])
     json = document.json
     json["extensions"] = {
         "KHR_lights_punctual": {"lights": [{"type": "lamp", "name": 7}, 5, {"type": "spot", "spot": 1}]}
@@ -370,7 +265,7 @@ def test_what_three_fails_on_is_left_out() -> None:
     json["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": i}}} for i in (0, 1, 2, 3, "x")]
     json["meshes"][0]["primitives"][0]["material"] = 1
     json["scenes"][0]["name"] = 5
-    content = _content(embed(document).glb)
+    content = content_of(embed(document).glb)
     assert embed(document).notes == ["6 references to missing materials or lights left out"]
     assert [node.get("extensions") for node in content["nodes"][1:]].count({}) == 5
     assert "cameras" not in content
