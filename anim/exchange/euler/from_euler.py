@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from anim.curves.fitting.adaptive_keys import TrackFunction, linear_keys
 from anim.errors import AnimError, RangeError
 from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement, curves_of, is_baked
 from anim.exchange.euler.curve import Mode, travel
+from anim.exchange.euler.equal_nodes import first_equal_nodes
 from anim.exchange.euler.evaluate import (
     bounding_size,
     evaluate_rotation,
@@ -63,15 +64,16 @@ def from_euler(
         raise RangeError(f"`tolerance` is {tolerance:g} rad (expected {MIN_TOLERANCE:g} to pi; radians, not degrees)")
     bones = skeleton(motion)
     size = bounding_size(bones) or 1.0
-    builder = _TrackBuilder(size)
+    builder = _TrackBuilder(motion.nodes, size)
     adaptive = False
-    for block in divide_nodes(motion.nodes):
-        nodes = {number: motion.nodes[number] for number in block}
+    distinct = sorted(builder.equal)
+    for block in divide_nodes([motion.nodes[number] for number in distinct]):
+        nodes = {number: motion.nodes[number] for number in (distinct[i] for i in block)}
         on_grid = {number: is_baked(motion, node, keys) for number, node in nodes.items()}
         adaptive = adaptive or any(not on_grid[number] and _changes(node) for number, node in nodes.items())
         builder.add(nodes, tolerance, sampled={number for number in nodes if on_grid[number]})
     ends = frozenset(i for i, node in enumerate(motion.nodes) if node.end)
-    tracks = tuple(share_time_axes(builder.tracks))
+    tracks = tuple(share_time_axes(sorted(builder.tracks, key=lambda track: track.node or 0)))
     return ImportedMotion(bones, Clip(name, tracks), ends, tolerance if adaptive else None)
 
 
@@ -80,17 +82,24 @@ def _changes(node: EulerNode) -> bool:
 
 
 class _TrackBuilder:
-    """Tracks of nodes in their order; those at rest are omitted. size: of the skeleton, in metres."""
+    """Tracks of nodes, by path for each node; those at rest are omitted.
 
-    def __init__(self, size: float) -> None:
+    equal: indices of the nodes that move alike, by the first of them. size: of the skeleton, in metres.
+    """
+
+    def __init__(self, nodes: Sequence[EulerNode], size: float) -> None:
         self.tracks: list[Track] = []
+        self.equal: dict[int, list[int]] = {}
+        for number, first in enumerate(first_equal_nodes(nodes)):
+            self.equal.setdefault(first, []).append(number)
+        self._nodes = nodes
         self._size = size
         self._units = {"translation": size, "rotation": 1.0, "scale": 1.0}
         self._stored = Float32Times()
         self._axes: dict[bytes, TimeAxis] = {}
 
     def add(self, nodes: Mapping[int, EulerNode], tolerance: float, *, sampled: Collection[int]) -> None:
-        """Add the tracks of nodes. tolerance: rad. sampled: those to which no keys are added."""
+        """Add the tracks of nodes and of those that move alike. tolerance: rad. sampled: without added keys."""
         found = fit_nodes(nodes, tolerance, self._units, sampled=sampled)
         for number, node in nodes.items():
             try:
@@ -99,7 +108,8 @@ class _TrackBuilder:
                         keys = found.get((number, path)) or self._alone(
                             node, path, None if number in sampled else tolerance
                         )
-                        self._add(number, node, path, keys)
+                        for other in self.equal[number]:
+                            self._add(other, self._nodes[other], path, keys)
             except AnimError as error:
                 raise error.at(f"node '{node.name}'") from None
 

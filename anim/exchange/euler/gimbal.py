@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from anim.arrays import Floats, Ints
+from anim.exchange.euler.equal_nodes import first_equal_rotations
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode, Pivots
 from anim.maths import euler, quaternion
 from anim.maths.euler import ORDERS, AxesConvention
@@ -53,16 +54,25 @@ def gimbal_stats(motion: EulerMotion, clip: Clip) -> tuple[GimbalStats, ...]:
     between them. Pre and post rotations are removed: the three angles are between them.
     Source: the Jacobian's singular values are 1, √(1 + s), √(1 − s), s the cosine of the distance from lock.
     """
-    rows: list[tuple[int, GimbalStats]] = []
-    for tracks in _batches(motion, clip):
+    every = [track for track in clip.tracks if _has_lock(motion, track)]
+    first = first_equal_rotations(motion, every)
+    rows: dict[int | None, GimbalStats] = {}  # by node
+    for tracks in _batches([every[i] for i in sorted(set(first))]):
         nodes = [motion.nodes[track.node] for track in tracks if track.node is not None]
         samples = _samples(tracks)
         turns = _without_pivots([node.pivots for node in nodes], samples)
         by_order = {order: _nearest(samples, turns, order) for order in ORDERS if order not in SAME_DISTANCE}
         by_order |= {order: by_order[other] for order, other in SAME_DISTANCE.items()}
         found = _rows(nodes, samples, turns, np.stack([by_order[order] for order in ORDERS]))
-        rows += zip((track.node or 0 for track in tracks), found, strict=True)
-    return tuple(row for _, row in sorted(rows, key=lambda each: each[0]))
+        rows |= zip((track.node for track in tracks), found, strict=True)
+    pairs = sorted((track.node or 0, every[i].node) for track, i in zip(every, first, strict=True))
+    return tuple(
+        rows[other] if node == other else replace(rows[other], node=motion.nodes[node].name) for node, other in pairs
+    )
+
+
+def _has_lock(motion: EulerMotion, track: Track) -> bool:
+    return track.path == "rotation" and track.node is not None and motion.nodes[track.node].order in ORDERS
 
 
 class _Samples(NamedTuple):
@@ -77,12 +87,11 @@ class _Samples(NamedTuple):
     rotations: Floats
 
 
-def _batches(motion: EulerMotion, clip: Clip) -> Iterator[list[Track]]:
+def _batches(tracks: Sequence[Track]) -> Iterator[list[Track]]:
     """Yield the rotations to evaluate together, of one interpolation, sized for CPU caches."""
     groups: dict[tuple[Interpolation, bool], list[Track]] = {}
-    for track in clip.tracks:
-        if track.path == "rotation" and track.node is not None and motion.nodes[track.node].order in ORDERS:
-            groups.setdefault((track.interpolation, _keys_suffice(track)), []).append(track)
+    for track in tracks:
+        groups.setdefault((track.interpolation, _keys_suffice(track)), []).append(track)
     for (_, at_keys), group in groups.items():
         samples = np.array([len(track.times) for track in group]) * (1 if at_keys else SAMPLES_PER_INTERVAL + 1)
         batch = (np.cumsum(samples) - samples) // MAX_BATCH_QUATERNIONS

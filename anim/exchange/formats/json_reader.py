@@ -80,6 +80,7 @@ CURVE_KEYS = ("times", "values", "interpolation", *HANDLES)
 KNOWN_KEYS: dict[tuple[str, ...], frozenset[str]] = {
     keys: frozenset(keys) for keys in (FILE_KEYS, NODE_KEYS, CURVE_KEYS)
 }
+MAX_COMPARED_KEYS = 64  # of curves that are compared as text; longer ones are read as fast
 PIVOT_KEYS = frozenset((*OFFSETS, *PIVOT_ROTATIONS))
 NOTHING, ORIGIN, UNSCALED = freeze(np.zeros(0)), freeze(np.zeros(3)), freeze(np.ones(3))
 
@@ -127,11 +128,15 @@ def _times(nodes: list[Any]) -> Iterator[float]:
 
 
 class _TimeAxes:
-    """Time axes of curves, moved by `later` seconds; curves with the same times share one."""
+    """Time axes of curves, moved by `later` seconds; curves with the same times share one.
+
+    curves: short ones by their text and unit.
+    """
 
     def __init__(self, later: float) -> None:
         self._later = later
         self._found: dict[bytes, TimeAxis] = {}
+        self.curves: dict[tuple[str, float], Curve] = {}
 
     def check(self, times: Floats) -> None:
         """Raise FormatError for the first time (K,) that is not after the previous one."""
@@ -170,7 +175,7 @@ def _node_builder(node: Any, said: PartialConvention, times: _TimeAxes, where: s
         try:
             kind, _, axis = channel.partition(".")
             slot = draft.place(kind, axis)
-            check_nodes(draft, slot, partial(_curve, about, times, at))
+            check_nodes(draft, slot, partial(_shared_curve, about, times, at))
         except FormatError as error:
             raise (error if error.where.startswith(at) else error.at(at)) from None
     return draft
@@ -190,6 +195,17 @@ def _pivots(node: Mapping[str, Any], convention: Convention, where: str) -> Pivo
             )
     offsets = {key: _parse_array(node, key, (3,), np.zeros(3), where) for key in OFFSETS}
     return Pivots(**turns, **offsets)
+
+
+def _shared_curve(about: Any, axes: _TimeAxes, where: str, unit: float) -> Curve:
+    """The curve; short ones of the same text are read once."""
+    values = about.get("values") if isinstance(about, dict) else None
+    if not isinstance(values, list) or len(values) > MAX_COMPARED_KEYS:
+        return _curve(about, axes, where, unit)
+    key = repr(about), unit  # unlike values, its text tells 1 from True
+    if key not in axes.curves:
+        axes.curves[key] = _curve(about, axes, where, unit)
+    return axes.curves[key]
 
 
 def _curve(about: Any, axes: _TimeAxes, where: str, unit: float) -> Curve:
