@@ -49,6 +49,10 @@ class KeyInterval(NamedTuple):
     u: Floats
     duration: Floats
 
+    def take(self, some: slice) -> KeyInterval:
+        """Return the intervals of some of the times."""
+        return KeyInterval(self.left[some], self.right[some], self.u[some], self.duration[some])
+
 
 def find_interval(times: Floats, at: Floats) -> KeyInterval:
     """Return the key intervals of times `at` (F,) among keys `times` (K,), clamped to the ends."""
@@ -99,9 +103,9 @@ def interpolate(
         return _mix(place, values, tangents, interpolation, is_rotation=is_rotation, is_unit=is_early)
     result = np.empty((*place.u.shape, *values.shape[1:]))
     for first in range(0, len(result), count):
-        some = KeyInterval(*(part[first : first + count] for part in place))
-        mixed = _mix(some, values, tangents, interpolation, is_rotation=is_rotation, is_unit=is_early)
-        result[first : first + count] = mixed
+        some = slice(first, first + count)
+        mixed = _mix(place.take(some), values, tangents, interpolation, is_rotation=is_rotation, is_unit=is_early)
+        result[some] = mixed
     return result
 
 
