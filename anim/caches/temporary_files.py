@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import shutil
 import tempfile
@@ -36,11 +37,21 @@ def temp_output(
 def check_free_space(size: int, name: str) -> None:
     """Raise OutputError unless `size` bytes fit beside the other temporary files: for packages that abort if not."""
     folder = tempfile.gettempdir()
-    free = shutil.disk_usage(folder).free
+    free = min(shutil.disk_usage(folder).free, _max_file_size())
     if size > free:
         raise OutputError(
             f"{name}: its {size} bytes don't fit in {folder} ({free} free)", help="TMPDIR names another folder"
         )
+
+
+def _max_file_size() -> float:
+    """The largest file that this process may write (`ulimit -f`), in bytes; infinity without a limit."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return math.inf
+    most, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+    return math.inf if most == resource.RLIM_INFINITY else most
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from anim.errors import DataRangeError
+from anim.errors import AnimError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.equal_clips import first_equal
@@ -23,7 +23,7 @@ from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification
 from anim.optimization.writing import changed_clips, write_solutions
-from anim.sampling.times import MAX_FRAMES
+from anim.sampling.times import check_duration
 
 SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
 
@@ -142,7 +142,7 @@ def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, T
 def _check_durations(clips: Sequence[Clip], chosen: Sequence[int]) -> None:
     """Raise DataRangeError for a clip that lasts too long to measure between keys, as `frame_times` does."""
     for number in chosen:
-        frames = clips[number].end * FPS
-        if frames > MAX_FRAMES:
-            where = reader.clip_label(clips[number].name, number)
-            raise DataRangeError(f"{frames:.3g} frames at {FPS:g} fps (limit {MAX_FRAMES})", where=where)
+        try:
+            check_duration(0.0, clips[number].end, fps=FPS)
+        except AnimError as error:
+            raise error.at(reader.clip_label(clips[number].name, number)) from None

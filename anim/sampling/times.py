@@ -32,6 +32,19 @@ def check_fps(fps: float) -> None:
         raise RangeError(f"`fps` is {fps:g} (expected a number above 0)")
 
 
+def check_duration(start: float, end: float, *, fps: float) -> float:
+    """Return the number of frames from `start` to `end` s, not rounded.
+
+    Raises DataRangeError for over ten million frames of a long clip, and UnsupportedError for as many at a rate that no
+    clip has.
+    """
+    frames = (end - start) * fps
+    if frames > MAX_FRAMES:
+        kind = DataRangeError if fps <= MAX_USUAL_FPS else UnsupportedError  # the clip is too long, or the rate high
+        raise kind(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
+    return frames
+
+
 def frame_times(start: float, end: float, *, fps: float) -> Floats:
     """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
 
@@ -43,10 +56,7 @@ def frame_times(start: float, end: float, *, fps: float) -> Floats:
     check_number(start, "start")
     check_number(end, "end")
     check_fps(fps)
-    frames = (end - start) * fps
-    if frames > MAX_FRAMES:
-        kind = DataRangeError if fps <= MAX_USUAL_FPS else UnsupportedError  # the clip is too long, or the rate high
-        raise kind(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
+    frames = check_duration(start, end, fps=fps)
     sliver = max(MIN_INTERVAL_FRAMES, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)
     times = start + np.arange(whole, dtype=np.float64) / fps

@@ -243,9 +243,9 @@ def test_a_buffer_or_image_that_is_not_there_is_a_finding(call: Call, tmp_path: 
 @pytest.mark.parametrize(
     ("name", "finding"),
     [
-        ("draco", "vertices-unread"),
+        ("draco", "invalid-vertices"),
         ("unknown_required_extension", "unknown-extension"),
-        ("joints_out_of_range", "vertices-unread"),
+        ("joints_out_of_range", "invalid-vertices"),
     ],
 )
 def test_what_does_not_concern_the_animation_is_a_finding(name: str, finding: str, call: Call) -> None:

@@ -156,11 +156,12 @@ def test_odd_lines_of_obj(lines: str, code: int, call: Call, tmp_path: Path) -> 
     check_ends_well(call("convert-cache", tmp_path / "a.obj", tmp_path / "out.npz"), (code,))
 
 
-def test_a_file_of_a_later_version_is_refused(asset: Find, call: Call, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", ["9.0", "2.1"])
+def test_a_file_of_a_later_version_is_refused(version: str, asset: Find, call: Call, tmp_path: Path) -> None:
     document = json.loads(asset("SimpleSkin.gltf").read_text())
-    document["asset"]["minVersion"] = "9.0"
+    document["asset"]["minVersion"] = version
     (tmp_path / "a.gltf").write_text(json.dumps(document))
-    assert "asset.minVersion: is '9.0'" in refusal(call("convert", tmp_path / "a.gltf", tmp_path / "out.glb"), 3)
+    assert f"asset.minVersion: is '{version}'" in refusal(call("convert", tmp_path / "a.gltf", tmp_path / "out.glb"), 3)
 
 
 @pytest.mark.parametrize(
@@ -252,10 +253,11 @@ def test_a_pipe_that_never_ends_is_refused(stream: str, tmp_path: Path) -> None:
     assert "stdin: is a pipe or device with more than 0.02 GB" in refusal(done, 4)
 
 
-def test_a_clip_that_is_too_long_to_measure_is_named(call: Call, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["optimize", "spline"])
+def test_a_clip_that_is_too_long_to_measure_is_named(command: str, call: Call, tmp_path: Path) -> None:
     path = tmp_path / "a.gltf"
     path.write_bytes(text(animated(times=[0, 1e6])))
-    assert "frames at 120 fps (limit 10000000)" in refusal(call("optimize", path, tmp_path / "out.glb"), 3)
+    assert "frames at 120 fps (limit 10000000)" in refusal(call(command, path, tmp_path / "out.glb"), 3)
 
 
 def test_control_characters_of_names_are_escaped_in_summaries(call: Call, tmp_path: Path) -> None:

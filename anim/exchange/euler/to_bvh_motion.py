@@ -21,11 +21,11 @@ from anim.maths.hierarchy import with_ancestors, with_descendants
 from anim.model import Clip, Skeleton, TimeAxis
 from anim.model.skeleton import nearest_ancestors
 from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
+from anim.sampling.times import check_duration, check_fps
 from anim.sampling.world import world_rotations
 from anim.units import format_number
 
 GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
-MAX_FRAMES = 10_000_000
 TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
 NOTED_ERROR_DEG = 1.0  # degrees, of rotations between frames
 CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
@@ -153,9 +153,9 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     start, end = clip.start, clip.end
     keys = clip.key_times
     if fps is not None:
-        if not (np.isfinite(fps) and fps > 0) or (end - start) * fps > MAX_FRAMES:
-            raise RangeError(f"`fps` is {fps:g} (expected a number above 0, and up to {MAX_FRAMES} frames)")
-        shown = np.arange(int(np.ceil((end - start) * fps - GRID_TOLERANCE_FRAMES)) + 1) / fps
+        check_fps(fps)
+        frames = check_duration(start, end, fps=fps)
+        shown = np.arange(int(np.ceil(frames - GRID_TOLERANCE_FRAMES)) + 1) / fps
     else:
         step = (end - start) / max(len(keys) - 1, 1)
         shown = np.asarray(np.arange(len(keys)) * step, np.float64)

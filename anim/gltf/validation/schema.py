@@ -172,8 +172,8 @@ def _version(value: Any) -> None:
 
 def _min_version(value: Any) -> None:
     text(value)
-    if value.split(".")[0] != "2":
-        raise FormatError(f"is '{value}' (expected 2.x, the version that is read)")
+    if value != "2.0":
+        raise FormatError(f"is '{value}' (expected 2.0, the version that is read)")
 
 
 def _check_channels(animation: Json) -> None:

@@ -9,6 +9,7 @@ from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
 from anim.measure.error.metric import NOISE
 from anim.measure.error.sample_times import cut_times
 from anim.model import Clip, Interpolation
+from anim.sampling.times import MAX_FRAMES
 
 
 class Spacing(NamedTuple):
@@ -40,7 +41,8 @@ def largest_error(prover: Prover, before: Clip, after: Clip, *, floor: float = 0
     )
     first = CUBICS if is_cubic else LINES
     found = _proof(prover, before, after, first, floor)
-    if is_closed(found, prover.ruler.diagonal, floor=floor) or not prover.is_refined:
+    is_short = max(before.end, after.end) < MAX_FRAMES * FINE.step
+    if is_closed(found, prover.ruler.diagonal, floor=floor) or not prover.is_refined or not is_short:
         return found
     again = _proof(prover, before, after, FINE, floor)
     bounds = [each.bound for each in (found, again) if each.bound is not None]

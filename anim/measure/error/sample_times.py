@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, unique_sorted
 from anim.model import Clip, Interpolation
 from anim.model.time_axis import merge_times
-from anim.sampling.times import check_fps, frame_times
+from anim.sampling.times import check_duration, check_fps, frame_times
 
 SAME_MOMENT = 1e-6  # s; closer times are equal, written as float32 and as float64
 FPS = 120.0  # fps of the grid for motion between keys
@@ -42,8 +42,10 @@ def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
 
     In seconds, increasing. Each interval between neighboring keys is divided into equal parts. parts: minimum number of
     parts of an interval, ≥ 1. step: s, maximum duration of a part; > 0.
+    Raises DataRangeError for the clips that `dense_times` refuses.
     """
     keys = _key_times(clips)
+    check_duration(0.0, float(keys[-1]), fps=FPS)
     gaps = np.diff(keys)
     counts = np.maximum(np.ceil(gaps / step).astype(np.int64), parts)
     gap = np.repeat(np.arange(len(gaps)), counts)

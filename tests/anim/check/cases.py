@@ -15,7 +15,7 @@ from anim.check.find import find_all
 from anim.check.finding import Finding
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError
-from anim.gltf.document import Document
+from anim.gltf.document import Buffer, Document
 from anim.gltf.io import container
 from anim.gltf.io.lenient import read_broken
 from anim.gltf.writing import writer
@@ -225,6 +225,16 @@ def without_joints(json: Json) -> None:
     del json["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"]
 
 
+def with_hidden_positions(document: Document) -> Document:
+    """Return a document with positions that only an extension nobody knows can give."""
+    json = copy.deepcopy(document.json)
+    position = json["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
+    json["accessors"][position].update(bufferView=len(json["bufferViews"]), byteOffset=0)
+    json["bufferViews"].append({"buffer": len(json["buffers"]), "byteLength": 9999, "extensions": {"ACME_packed": {}}})
+    json["buffers"].append({"byteLength": 9999})
+    return Document(json, (*document.buffers, Buffer(9999, None, None)))
+
+
 def apart(json: Json) -> None:
     """Take the last joint out of the hierarchy of the others."""
     last = json["skins"][0]["joints"][-1]
@@ -305,8 +315,9 @@ WRONG: dict[str, tuple[Document | CheckedFile, str]] = {
     "GA017": (edited(with_strides), "/accessors/"),
     "GA018": (edited(with_matrix), "/nodes/"),
     "GA019": (edited(put("extensionsRequired", ["ACME_sky"])), "/extensionsRequired"),
-    "GA020": (edited(without_joints), "/meshes"),
+    "GA020": (with_hidden_positions(opened_fixture("arm")), "/meshes"),
     "GA021": (without_file(opened_fixture("arm")), "/images/0/uri"),
+    "GA022": (edited(without_joints), "/meshes"),
     "GA101": (with_tracks(rotation(0, 175)), "/animations/0"),
     "GA102": (with_tracks(rotation(0, 100)), "/animations/"),
     "GA103": (with_tracks(rotation(0, 30, sign=-1)), "/animations/0"),

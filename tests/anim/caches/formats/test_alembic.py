@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -98,4 +99,12 @@ def test_a_full_folder_for_temporary_files_is_refused_before(monkeypatch: pytest
     """alembic3d aborts the process where a write fails."""
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=10))
     with pytest.raises(OutputError, match="don't fit"):
+        written(cache(), "a.abc")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no `ulimit -f`")
+def test_a_limit_of_files_is_heeded_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (10, resource.RLIM_INFINITY))
+    with pytest.raises(OutputError, match=r"\(10 free\)"):
         written(cache(), "a.abc")
