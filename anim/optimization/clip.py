@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track, parse_weight_pointer
+from anim.model.track import share_time_axes
 from anim.optimization.options import Drop
 from anim.optimization.search.context import Context
 from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
@@ -42,16 +43,32 @@ class Task:
 
 
 def solve(context: Context, task: Task) -> Solution | None:
-    """Return the smallest solution within the bounds that the effort finds; None if there is none."""
-    return _TrackSorter(context, task).solution()
+    """Return the smallest solution within the bounds that the effort finds; None if there is none.
+
+    Lines that replace splines are compared track by track, and all of them together: on one time axis each of them can
+    be smaller than its spline where all splines would need no such axis.
+    """
+    found = _TrackSorter(context, task).solution()
+    if found is None or _splines(found.clip) == _splines(task.clip):
+        return found
+    other = _TrackSorter(context, task, keep_splines=True).solution()
+    return found if other is None else min(found, other, key=lambda each: each.size(context.coding))
+
+
+def _splines(clip: Clip) -> int:
+    return sum(track.interpolation is Interpolation.CUBICSPLINE and len(track.times) > 1 for track in clip.tracks)
 
 
 class _TrackSorter:
-    """The tracks of one clip, sorted by treatment: dropped, kept, reduced alone or left to the search."""
+    """The tracks of one clip, sorted by treatment: dropped, kept, reduced alone or left to the search.
 
-    def __init__(self, context: Context, task: Task) -> None:
+    keep_splines: whether CUBICSPLINE tracks are kept exactly; else those that are smaller than lines.
+    """
+
+    def __init__(self, context: Context, task: Task, *, keep_splines: bool = False) -> None:
         self._context = context
         self._task = task
+        self._kept = {Interpolation.STEP, Interpolation.CUBICSPLINE} if keep_splines else {Interpolation.STEP}
         self._clip = task.clip
         self._done: dict[int, tuple[Track, EncodedKeys]] = {}
         self._dropped: list[int] = []
@@ -87,9 +104,7 @@ class _TrackSorter:
             self._keep_track(i, key_reduction.reduce_pointer_keys(track, self._context.bounds.max_pointer_error))
         elif self._is_invisible(i):
             self._dropped.append(i)
-        elif (
-            track.node in policy.keep or exact or track.interpolation is Interpolation.STEP or self._is_off_unit(track)
-        ):
+        elif track.node in policy.keep or exact or track.interpolation in self._kept or self._is_off_unit(track):
             self._keep_exactly(i)
         elif self._task.at_rest and self._task.at_rest[i]:
             self._settle(i, track)
@@ -158,7 +173,7 @@ class _TrackSorter:
             reach = context.track_reach(track)
             kept = context.policy.keep.intersection(moved_nodes(context.skeleton, track))
             exact = context.bounds.max_error == 0 or bool(kept)
-            if exact or not reach.size or track.interpolation is Interpolation.STEP:
+            if exact or not reach.size or track.interpolation in self._kept:
                 self._keep_track(i, key_reduction.reduce_lossless(track))
                 continue
             if track.node is not None and not has_pointers and self._is_droppable(i):
@@ -247,8 +262,8 @@ def _with_ends(clip: Clip, every: dict[int, tuple[Track, EncodedKeys]], dropped:
         number = min(every, key=lambda i: (len(every[i][0].times), every[i][0].values.shape[1], i))
         every[number] = _with_own_keys(clip_ends.extend(every[number][0], clip.start, clip.end))
     ordered = [every[i] for i in sorted(every)]
-    tracks, stored = tuple(track for track, _ in ordered), tuple(each for _, each in ordered)
-    return Solution(Clip(clip.name, tracks), stored, tuple(dropped))
+    tracks, stored = share_time_axes(track for track, _ in ordered), tuple(each for _, each in ordered)
+    return Solution(Clip(clip.name, tuple(tracks)), stored, tuple(dropped))
 
 
 def _is_weights(track: Track) -> bool:

@@ -145,6 +145,20 @@ def test_a_spline_stays_where_lines_take_more_bytes() -> None:
     assert loose.interpolation is LINEAR
 
 
+def test_splines_stay_where_the_lines_of_all_take_more_bytes() -> None:
+    """On the dense axis of lines each costs less than a spline; with the spline kept, the turn needs no such axis."""
+    at = np.linspace(0, 2, 9)
+    jumps = track("scale", at, 1 + 0.1 * (np.arange(9) % 2)[:, None] * np.ones(3), STEP, node=2)
+    turn = track("rotation", at, about("z", 30 * np.sin(7 * at)), node=1)
+    knots, tangents = about("x", np.array([0, 40, 10, 60])), np.zeros((4, 4))
+    spline = track("rotation", np.linspace(0, 2, 4), knots, CUBICSPLINE, tangents=(tangents, tangents), node=0)
+    what = clip(jumps, turn, spline)
+    found = _by_target(_solved(what, max_error=0.05).clip)
+    assert found[0, "rotation"].interpolation is CUBICSPLINE
+    assert found[1, "rotation"].storage == INT16
+    assert found[1, "rotation"].time_axis is found[2, "scale"].time_axis
+
+
 def test_turns_far_from_unit_length_are_left_alone() -> None:
     """Players that don't normalize show another motion; which one was meant nobody knows."""
     bent = track("rotation", TIMES, 1.01 * turning(1.0), node=1)
