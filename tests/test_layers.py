@@ -183,6 +183,21 @@ def test_heavy_packages_are_imported_late() -> None:
     assert not wrong, "import it inside of the function that uses it: start-up loads numpy and typer only"
 
 
+def test_one_module_imports_rapier_and_one_is_its_interface() -> None:
+    folder = ROOT / "anim" / "simulation" / "rigid_bodies" / "rapier"
+    users = [path for path in MODULES if any(name.partition(".")[0] == "rapier3d" for name in _imported(path))]
+    assert users == [folder / "package.py"]
+    inside = "anim.simulation.rigid_bodies.rapier."
+    interfaces = {
+        name.removeprefix(inside).partition(".")[0]
+        for path in MODULES
+        if path.parent != folder
+        for name in _imported(path)
+        if name.startswith(inside)
+    }
+    assert interfaces == {"world"}
+
+
 def test_the_cache_of_machine_code_knows_all_kernels() -> None:
     """A change of any kernel makes a new cache: numba doesn't check callees."""
     folders = {path.parent.relative_to(ROOT / "anim").as_posix() for path in KERNELS}

@@ -177,6 +177,7 @@ def test_what_a_format_has_no_place_for(option: str, name: str, call: Call, fixt
     assert not (tmp_path / name).exists()
 
 
+@pytest.mark.slow
 def test_tangents_of_a_real_file(call: Call, asset: Find, tmp_path: Path) -> None:
     """Rigid nodes turn them as they turn the file's own: checked by a product with the nodes' matrices."""
     source = asset("BusterDrone/busterDrone.gltf")

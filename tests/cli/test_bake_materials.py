@@ -232,6 +232,7 @@ def test_real_files_keep_materials_images_and_texture_coordinates(
     assert again.read_bytes() == out.read_bytes()
 
 
+@pytest.mark.slow
 @needs_judge
 @pytest.mark.parametrize(("name", "clip"), [*ASSETS, ("", "bend")])
 def test_three_shows_the_source_within_the_stated_error(

@@ -46,6 +46,7 @@ def test_usd_cores_validators_find_nothing(call: Call, source: Path, ending: str
     assert "the scale of normal maps is left out" in run.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "clip"), ASSETS)
 def test_real_files(call: Call, asset: Find, tmp_path: Path, name: str, clip: str) -> None:
     out = tmp_path / "out.usdz"

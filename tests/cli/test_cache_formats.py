@@ -162,6 +162,7 @@ def test_directions_that_are_lost_are_said(tmp_path: Path, call: Call) -> None:
     assert "warning: normals and tangents are not played: bake the glTF file with them\n" in run.err
 
 
+@pytest.mark.slow
 def test_one_frame_of_any_format_reads_the_same_by_name_and_pipe(tmp_path: Path, call: Call) -> None:
     for ending in (each for each in (*WHOLE, *FRAMES) if each in READABLE):
         files = written(at_time(cache(normals=False), 0), f"a{ending}", None)[0].files

@@ -24,6 +24,7 @@ def nameless(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line",
     [

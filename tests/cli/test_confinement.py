@@ -63,6 +63,7 @@ int[] faceVertexIndices = [0, 1, 2]
 CLIPS = 'def Mesh "s" ( clips = { dictionary default = { asset[] assetPaths = [@SECRET@] } } ) {'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

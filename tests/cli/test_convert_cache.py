@@ -57,6 +57,7 @@ def test_one_line_says_what_came_of_it(walk: Path, call: Call) -> None:
     assert call("convert-cache", walk, walk.with_name("a.mdd"), "-q").err == ""
 
 
+@pytest.mark.slow
 def test_pipes(walk: Path, tmp_path: Path) -> None:
     run = shell(
         "gltf-anim convert-cache - - --format pc2 < walk.npz | gltf-anim convert-cache - - --format mdd --input-fps 30 "

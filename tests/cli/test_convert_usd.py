@@ -112,6 +112,7 @@ def test_images_beside_a_gltf_are_inside(call: Call, asset: Find, tmp_path: Path
         assert package.read("image0.jpg") == asset("CesiumMan-gltf/CesiumMan_img0.jpg").read_bytes()
 
 
+@pytest.mark.slow
 def test_back_as_a_cache(call: Call, asset: Find, tmp_path: Path) -> None:
     """The vertices of the file, read as a cache, are those of a bake within the stated error."""
     skinned, cache, truth = (tmp_path / name for name in ("a.usdz", "a.npz", "b.npz"))

@@ -48,6 +48,7 @@ def test_all_files_that_are_read_are_named(character: Path, call: Call) -> None:
     assert Path("out.d").read_text() == rule("out.glb", *(rf"in\ dir/{name}" for name in files))
 
 
+@pytest.mark.slow
 def test_second_inputs_are_named_too(folder: Path, call: Call, asset: Find) -> None:
     (folder / "hero.glb").write_bytes(built("biped"))
     call("to-euler", "hero.glb", "walk.bvh", "--clip", "walk", "--depfile", "walk.d").product()

@@ -26,6 +26,7 @@ def test_three_says_the_same(asset: Find, tmp_path: Path, call: Call) -> None:
         assert by_name[each.name]["max_error_m"] == pytest.approx(each.max_error, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Fox.glb", "Robot.glb"])
 def test_what_gltfpack_does_by_default_is_seen(name: str, asset: Find, tmp_path: Path, call: Call) -> None:
     """30 frames a second, joints without names, quantized and reordered vertices: seen as motion only where it is."""

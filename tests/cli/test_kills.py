@@ -130,6 +130,7 @@ def sequence(folder: Path) -> list[str]:
     return ["bake", "walk.glb", "c.ply", "--clip", "walk", "--fps", "4", "--method", "dqs"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", HOWS)
 @pytest.mark.parametrize(
     ("case", "first"),
@@ -176,6 +177,7 @@ def test_random_kills_leave_whole_pairs(call: Call, walk: Path, tmp_path: Path) 
     assert len(seen) >= 1
 
 
+@pytest.mark.slow
 def test_writers_of_one_file_leave_a_whole_one_and_readers_find_one(call: Call, walk: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.gltf"
     call("resample", walk, out, "--fps", "4", "-q").product()

@@ -139,6 +139,7 @@ def test_equal_clips_are_optimized_once(call: Call, tmp_path: Path, monkeypatch:
     assert [clip.tracks[0].values[-1].tolist() for clip in found] == [[5, 0, 0], [5, 0, 0], [0, 0, 5], [5, 0, 0]]
 
 
+@pytest.mark.slow
 def test_a_plot_takes_the_span_of_a_clip_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is a search over all tracks: for each of them it would be quadratic."""
     pytest.importorskip("matplotlib")
@@ -226,6 +227,7 @@ def test_a_bvh_computes_angles_of_many_nodes_at_once(
     assert 0 < len(counted) < 5
 
 
+@pytest.mark.slow
 def test_static_nodes_are_measured_as_one(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 3000 nodes one moves: world matrices are those of a few nodes, in every frame."""
     sizes: list[int] = []

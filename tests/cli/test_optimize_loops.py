@@ -9,14 +9,15 @@ import pytest
 
 from anim.model import Track
 from tests.cli.conftest import Call, Find, Fixture
-from tests.files import clips_of, mark_slow
+from tests.files import clips_of
 
 REAL = ("Fox.glb", "CesiumMan.glb", "BitmojiRun.glb")
 LARGE = ("Knight.glb", "Robot.glb")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("--meshopt", "ext")])
-@pytest.mark.parametrize("bound", mark_slow(["0.01%", "0.5%"], slow=["0.01%"]))
+@pytest.mark.parametrize("bound", ["0.01%", "0.5%"])
 def test_loops_of_the_biped_stay_closed(
     call: Call, fixture: Fixture, bound: str, options: tuple[str, ...], tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ from tests.cli.conftest import Call, Find
 FAST = ("--effort", "fast")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(fixtures.FIXTURES))
 def test_inspect_finds_no_redundant_key_of_a_fixture(name: str, fixture: Find, call: Call, tmp_path: Path) -> None:
     assert call("optimize", fixture(name), tmp_path / "out.glb", *FAST).code == 0
@@ -30,6 +31,7 @@ def test_inspect_finds_no_redundant_key(name: str, asset: Find, call: Call, tmp_
     assert second.read_bytes() == first.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "clip"), [("BitmojiRun.glb", "*"), ("Knight.glb", "T-Pose")])
 def test_without_loss_whatever_may_be_dropped(name: str, clip: str, asset: Find, call: Call, tmp_path: Path) -> None:
     """Rests in decimals, keys in float32: near enough to look the same, and not the same."""

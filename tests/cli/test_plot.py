@@ -133,6 +133,7 @@ def test_eases_and_rules(call: Call, tmp_path: Path) -> None:
     assert {"catmull-rom", "0.5", "2 s"} <= set(timed)
 
 
+@pytest.mark.slow
 def test_integrators_of_an_oscillator(call: Call) -> None:
     said = words(call("plot", "--integrators", "--omega", "20", "--step", "1/9", "--format", "svg").product())
     title = next(each for each in said if each.startswith("Step 1/9 s, ω·h = 2.22: "))

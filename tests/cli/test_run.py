@@ -21,6 +21,7 @@ from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, wri
 PLAIN = ("resample --fps 12",)
 
 
+@pytest.mark.slow
 def test_the_output_is_that_of_single_commands(folder: Path, call: Call) -> None:
     write_crowd(folder, hero="biped", cube="morph_cube")
     write_recipe(folder)

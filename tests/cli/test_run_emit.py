@@ -12,7 +12,6 @@ import pytest
 from tests.cli.conftest import Call
 from tests.cli.running import ENVIRONMENT, help_line, refusal
 from tests.cli.running_recipes import write_crowd, write_recipe
-from tests.files import mark_slow
 
 TOOLS = {"shell": ["bash", "-e"], "make": ["make", "-j2", "-f"], "ninja": ["ninja", "-f"]}
 
@@ -23,7 +22,8 @@ def outputs(folder: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.parametrize("tool", mark_slow(TOOLS, slow=["ninja"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("tool", TOOLS)
 def test_a_script_makes_what_a_run_makes(tool: str, folder: Path, call: Call) -> None:
     if shutil.which(TOOLS[tool][0]) is None:
         pytest.skip(f"{TOOLS[tool][0]} is not installed")

@@ -18,7 +18,6 @@ from cli.workflows.run.workers import local_pool, run_jobs
 from tests.cli.conftest import Call
 from tests.cli.running import ENVIRONMENT, started
 from tests.cli.running_recipes import journal, statuses, write_long_run
-from tests.files import mark_slow
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 NUM_FILES = 20
@@ -95,7 +94,8 @@ def names_of(folder: Path) -> list[str]:
     return sorted(path.name for path in (folder / "build/crowd").iterdir())
 
 
-@pytest.mark.parametrize("how", mark_slow([signal.SIGKILL, signal.SIGTERM], slow=[signal.SIGTERM]))
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
 def test_a_worker_that_is_ended_costs_nothing(how: signal.Signals, crowd: Path) -> None:
     run = begin(crowd)
     wait_for_outputs(crowd, run, 2)
@@ -145,6 +145,7 @@ def test_a_run_that_is_ended_leaves_nothing_half_written_and_resumes(
         assert f"crowd/{path.name}" not in before or path.stat().st_mtime_ns == stamps[path.name]
 
 
+@pytest.mark.slow
 def test_jobs_in_one_process_and_in_several_make_the_same(crowd: Path, call: Call) -> None:
     subprocess.run([sys.executable, "-m", "anim", "run", "-q", "crowd/03.glb"], cwd=crowd, env=ENVIRONMENT, check=True)
     alone = (crowd / "build/crowd/03.glb").read_bytes()

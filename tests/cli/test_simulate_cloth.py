@@ -147,6 +147,7 @@ def test_cloth_keeps_the_materials_that_bake_keeps(fixture: Fixture, call: Call,
     assert [part for part in parts if part in baked] == baked  # the pole stays beside the cloth; bake leaves it out
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_for_any_number_of_threads(
     fixture: Fixture, call: Call, tmp_path: Path
 ) -> None:

@@ -48,6 +48,7 @@ def test_mutations_end_well(family: str) -> None:
     assert run.returncode == 0, run.stdout + run.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FOUND.is_dir(), reason="nothing was found")
 def test_inputs_that_were_found_end_well() -> None:
     run = fuzz("--replay", str(FOUND))

@@ -76,6 +76,7 @@ def test_influences_come_in_groups_of_four() -> None:
     assert found.max_count == 8
 
 
+@pytest.mark.slow
 def test_code_is_cached_for_one_version_and_set_of_sources(tmp_path: Path) -> None:
     """Numba looks at a kernel's own file only, and would go on with what an older helper was compiled to."""
     first = _run(tmp_path)

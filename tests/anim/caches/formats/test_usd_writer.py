@@ -104,6 +104,7 @@ def test_a_stage_of_others() -> None:
     assert positions[1, 6] == pytest.approx([0.01, 0.01, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("cut", [0, 8, 60, 0.5])
 def test_cut_off_files_are_refused_in_silence(ending: str, cut: float, capfd: pytest.CaptureFixture[str]) -> None:

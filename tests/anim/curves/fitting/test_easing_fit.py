@@ -19,7 +19,6 @@ from anim.maths import quaternion as quat
 from anim.model import Track
 from anim.operations.cubic_segments import CubicSegments
 from anim.operations.ease_track import ease_segments
-from tests.files import mark_slow
 
 MANY = np.linspace(0, 1, 1001)
 CURVED = [name for name, ease in EASINGS.items() if ease.exact is None]
@@ -170,10 +169,9 @@ def test_no_turn(name: str) -> None:
     np.testing.assert_allclose(found.slope0, 0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "name", mark_slow(["quint-out", "expo-out", "sine-in-out", "smootherstep"], slow=["quint-out"])
-)
-@pytest.mark.parametrize("tolerance", mark_slow([0.05, 0.2], slow=[0.05]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["quint-out", "expo-out", "sine-in-out", "smootherstep"])
+@pytest.mark.parametrize("tolerance", [0.05, 0.2])
 def test_every_angle_of_a_shared_fit_is_within_the_tolerance(name: str, tolerance: float) -> None:
     """The error at the largest angle was taken as the bound: smaller angles were off by up to 60 % more."""
     limit = np.radians(tolerance)

@@ -57,6 +57,7 @@ def _motion(seed: int, count: int = 12) -> EulerMotion:
     return EulerMotion(tuple(_node(chance, number) for number in range(count)))
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from((0.05, 0.005)))
 def test_nodes_together_have_the_keys_of_each_node_alone(seed: int, tolerance: float) -> None:

@@ -23,7 +23,7 @@ from anim.maths import matrix
 from anim.model import Clip, Interpolation, Track
 from anim.operations.resample import resample
 from fixtures.broken.pieces import animated, text
-from tests.files import mark_slow, opened
+from tests.files import opened
 from tests.judge import judge, needs_judge
 from tests.khronos import errors, needs_validator, validate
 
@@ -144,9 +144,10 @@ def with_matrices(path: Path) -> bytes:
     return b"".join(piece.tobytes() for piece in container.glb(changed))
 
 
+@pytest.mark.slow
 @needs_judge
 @needs_validator
-@pytest.mark.parametrize("name", mark_slow(["CesiumMan.glb", "Fox.glb"], slow=["Fox.glb"]))
+@pytest.mark.parametrize("name", ["CesiumMan.glb", "Fox.glb"])
 def test_real_files_with_matrices_play_as_three_plays_them(name: str, asset: Find, tmp_path: Path) -> None:
     """three.js opens such files as they are; the Khronos validator calls them invalid, and ours valid."""
     given, out = tmp_path / "given.glb", tmp_path / "out.glb"

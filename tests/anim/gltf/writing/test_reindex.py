@@ -200,6 +200,7 @@ def test_random_files_keep_what_meshes_and_clips_use(content: Json, blob: bytes)
         assert glb_of(drop_placeholders(after)) == glb_of(after)
 
 
+@pytest.mark.slow
 @needs_validator
 def test_real_files_stay_valid_and_get_smaller(asset: Find) -> None:
     documents, results = [], []

@@ -57,6 +57,7 @@ def test_the_bound_is_tight_where_nothing_is_cubic(seed: int) -> None:
     assert found.error.max_error <= found.bound <= 1.1 * found.error.max_error + 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1, 3])
 @pytest.mark.parametrize(
     ("name", "number"),

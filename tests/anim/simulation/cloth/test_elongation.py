@@ -36,6 +36,7 @@ def test_a_large_sheet_is_hardly_longer_at_any_time(size: int, corners: bool, su
     assert run.report.worst_stretch["fraction"] <= limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("corners", [False, True])
 @pytest.mark.parametrize("max_stretch", [0.02, 0.005])
 def test_the_largest_stretch_is_met_over_the_whole_swing(corners: bool, max_stretch: float) -> None:

@@ -33,6 +33,7 @@ def test_a_loop_that_settles_ends_as_it_begins() -> None:
     assert np.abs(np.diff(frames, axis=0)[[0, -1]])[:, free].max() > 1e-3  # and it moves through the seam
 
 
+@pytest.mark.slow
 def test_a_loop_that_never_settles_is_blended_and_its_seam_reported() -> None:
     scene, clip, node, pinned = flag()
     options = ClothOptions(environment=Environment(wind=(6.0, 0, 2)), duration=3.0, loop=True)

@@ -34,6 +34,7 @@ def test_a_mass_spring_cloth_beyond_its_limit_is_an_error_with_advice() -> None:
     assert run.report.energy_j["peak"] <= run.report.energy_j["start"] * 1.01 + 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["symplectic-euler", "verlet", "rk4", "implicit-euler"])
 def test_integrators_agree_at_small_steps(integrator: str) -> None:
     positions, faces = sheet(5, 5)

@@ -1,4 +1,4 @@
-"""Rapier's package behind one interface, and the same numbers for any number of threads and processes."""
+"""Rapier: the same numbers for any number of threads and processes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,7 @@ from anim.simulation.rigid_bodies.rapier.materials import MaterialPairs
 from anim.simulation.rigid_bodies.rapier.slip import ColliderPair, SlipReader, Velocity
 from tests.anim.simulation.rigid_bodies.cases import body, box_pile, ground, needs_rapier, run
 from tests.cli.running import ROOT
-from tests.files import mark_slow
-from tests.test_layers import MODULES, _imported
 
-FOLDER = ROOT / "anim" / "simulation" / "rigid_bodies" / "rapier"
 PILE = """
 import hashlib
 from tests.anim.simulation.rigid_bodies.cases import box_pile, run
@@ -27,22 +24,9 @@ print(hashlib.sha256(motion.positions.tobytes() + motion.rotations.tobytes()).he
 """
 
 
-def test_one_module_imports_the_package_and_one_is_its_interface() -> None:
-    users = [path for path in MODULES if any(name.partition(".")[0] == "rapier3d" for name in _imported(path))]
-    assert users == [FOLDER / "package.py"]
-    inside = "anim.simulation.rigid_bodies.rapier."
-    interfaces = {
-        name.removeprefix(inside).partition(".")[0]
-        for path in MODULES
-        if path.parent != FOLDER
-        for name in _imported(path)
-        if name.startswith(inside)
-    }
-    assert interfaces == {"world"}
-
-
+@pytest.mark.slow
 @needs_rapier
-@pytest.mark.parametrize("static", mark_slow(["0.5", "0.8"], slow=["0.5"]))
+@pytest.mark.parametrize("static", ["0.5", "0.8"])
 def test_threads_and_processes_change_no_number(static: str) -> None:
     found = set()
     for threads in ("1", "2", "5", "2"):

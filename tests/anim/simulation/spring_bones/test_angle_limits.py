@@ -40,6 +40,7 @@ def with_limits(case: Case) -> Case:
     return replace(case, document=replace(case.document, json=json))
 
 
+@pytest.mark.slow
 def test_limits_agree_with_the_plain_loop() -> None:
     free = swaying(opened_fixture("springs"), num_frames=121)
     case = with_limits(free)

@@ -42,6 +42,7 @@ def test_all_chains_agree_with_the_plain_loop(case: Case) -> None:
     assert chord(case.bones.nodes, motion.rotations, *case.plain(faults=False)) < TOLERANCE
 
 
+@pytest.mark.slow
 def test_animated_scales_and_lengths_agree_with_the_plain_loop(case: Case) -> None:
     """Uneven scales above chains, and joints and tails that move away from their parents."""
     swell = 1 + 0.3 * np.sin(3 * case.times)

@@ -97,6 +97,7 @@ def test_a_flat_joint_gives_finite_numbers() -> None:
         assert found[0, 1].tolist() == [0, 0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", TURNING)
 def test_the_unit_of_a_rig_does_not_matter(method: str) -> None:
     """Bind matrices from a hundredth of a metre, as many exporters write them, give the same shape in metres."""
