@@ -83,12 +83,19 @@ class Solution:
         return self if name == self.clip.name else Solution(Clip(name, self.clip.tracks), self.stored, self.dropped)
 
     def size(self, coding: Encoding) -> float:
-        """Return the approximate number of bytes of the clip."""
+        """Return the approximate number of bytes of the clip; equal values are stored once."""
         tracks, prices = self.clip.tracks, coding.byte_costs
         text = sum(prices.single_key if len(track.times) == 1 else prices.track for track in tracks)
         times = sum(prices.axis + 4 * len(axis) for axis in self.clip.time_axes)
-        plain = sum(value_bytes(track) for track, keys in zip(tracks, self.stored, strict=True) if not keys.codes)
-        return text + times + plain + coding.size([keys for keys in self.stored if keys.codes])
+        pairs = zip(tracks, self.stored, strict=True)
+        plain = {_stored_values(track): value_bytes(track) for track, keys in pairs if not keys.codes}
+        return text + times + sum(plain.values()) + coding.size([keys for keys in self.stored if keys.codes])
+
+
+def _stored_values(track: Track) -> tuple[object, ...]:
+    """What is equal for tracks whose values are stored equally."""
+    parts = (track.values, track.in_tangents, track.out_tangents)
+    return (track.storage, *(part.tobytes() for part in parts if part is not None))
 
 
 def value_bytes(track: Track) -> int:

@@ -17,12 +17,15 @@ INT16_SIZE = 2  # bytes of a component; rotations may be stored so without loss
 def min_lossless_bytes(tracks: Sequence[Track], costs: ByteCosts) -> float:
     """Return bytes that `key_reduction.reduce_lossless` of all tracks takes at least, times and constants apart.
 
-    Tracks on one time axis are counted together. Pointers count nothing: they have a bound of their own.
+    Tracks on one time axis are counted together, and tracks of equal values once. Pointers count nothing: they have a
+    bound of their own.
     """
+    seen: set[bytes] = set()
     groups: dict[tuple[TimeAxis, Interpolation, int, int], list[Floats]] = {}
     for track in tracks:
-        if track.node is None:
+        if track.node is None or (data := track.values.tobytes()) in seen:
             continue
+        seen.add(data)
         size = COMPONENT_SIZES[track.storage.component_type]
         component = min(size, INT16_SIZE) if track.path == "rotation" else size
         key = track.time_axis, track.interpolation, track.values.shape[1], component

@@ -32,12 +32,14 @@ def test_values_as_stored() -> None:
     assert value_bytes(spline) == 108
 
 
-def test_axes_count_once() -> None:
+def test_axes_and_equal_values_count_once() -> None:
     times = np.array([0.0, 1, 2])
-    one, other = (track(path, times, np.eye(3), node=0) for path in ("translation", "scale"))
+    one, other = (track(*each, node=0) for each in (("translation", times, np.eye(3)), ("scale", times, 2 * np.eye(3))))
     apart, shared = _solution(clip(one, other)), _solution(clip(one, replace(other, time_axis=one.time_axis)))
     assert shared.size(CORE) == 2 * PRICE.track + 2 * 36 + PRICE.axis + 12
     assert apart.size(CORE) - shared.size(CORE) == PRICE.axis + 12
+    again = replace(one, node=1, interpolation=Interpolation.STEP)
+    assert _solution(clip(one, again)).size(CORE) == 2 * PRICE.track + 36 + PRICE.axis + 12
 
 
 def test_single_keys_are_cheaper() -> None:
