@@ -90,6 +90,11 @@ def _end_of(error: BaseException | None) -> int | None:
     return None
 
 
+def common_options(text: str) -> str:
+    """Return a text of the library's with the options that all commands have."""
+    return text.replace("`memory_limit`", "--memory-limit")
+
+
 def report_error(error: AnimError) -> int:
     """Report an error as one line, with its help if any, and return the exit code."""
     code = CODES.get(type(error), BUG)
@@ -97,8 +102,8 @@ def report_error(error: AnimError) -> int:
         vars(error).pop("__notes__", None)  # the help, which is written separately
         _print_trace()
     where = f"{cut_middle(error.where)}: " if error.where else ""
-    # Reports of several files print errors on their own, without the options of a command; this one all commands have
-    _print_error(where + cut_middle(error.problem), error.help.replace("`memory_limit`", "--memory-limit"))
+    # Reports of several files print errors on their own, without the options of a command
+    _print_error(where + cut_middle(error.problem), common_options(error.help))
     return code
 
 

@@ -220,8 +220,7 @@ def _skin(source: Source, reporter: Reporter) -> SkinMotion:
     try:
         return SkinMotion(scenes.read_scene(source.document, source.name, reporter, repeats=False))
     except AnimError as error:
-        hint = f" ({error.help})" if error.help else ""
-        reporter.warn(f"measured at nodes, not on the skin: {error}{hint}")
+        scenes.warn_of_nodes(error, "skin", reporter)
         return SkinMotion(Scene(reader.skeleton(source.document), ()))
 
 

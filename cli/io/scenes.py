@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
+from anim.errors import AnimError
 from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
@@ -12,6 +13,7 @@ from anim.gltf.validation.channel_targets import has_weight_pointers
 from anim.model import Scene, Skeleton
 from anim.sampling.weight_pointers import ineffective_weight_pointers
 from anim.skinning.analysis.weight_sums import unnormalized_weights
+from cli.errors import common_options
 from cli.text import Reporter
 
 
@@ -35,6 +37,12 @@ def read_scene(
     found = reader.scene(document, accessors, skeleton, normals=normals, tangents=tangents, repeats=repeats)
     warn_of_scene(found, document, name, reporter, accessors=accessors, chosen=nodes(found))
     return found
+
+
+def warn_of_nodes(error: AnimError, part: str, reporter: Reporter) -> None:
+    """Warn that vertices can't be read, so that motion is measured at nodes and not on a part: "surface"."""
+    hint = f" ({common_options(error.help)})" if error.help else ""
+    reporter.warn(f"measured at nodes, not on the {part}: {error}{hint}")
 
 
 def warn_of_scene(

@@ -179,8 +179,7 @@ def _measured(
     if error is None:
         scenes.warn_of_scene(scene, source.document, source.name, reporter, accessors=accessors)
     else:
-        hint = f" ({error.help})" if error.help else ""
-        reporter.warn(f"measured at nodes, not on the surface: {error}{hint}")
+        scenes.warn_of_nodes(error, "surface", reporter)
     prover = Prover(ErrorMetric(scene, clips=(*edited.before.values(), *edited.after.values())))
     pairs = [(before, edited.after[i]) for i, before in edited.before.items()]
     first = first_equal(pairs)

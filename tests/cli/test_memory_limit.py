@@ -113,6 +113,59 @@ def of_joints(count: int) -> bytes:
     )
 
 
+def of_instances(count: int, vertices: int, *, skinned: bool) -> bytes:
+    """One mesh on `count` nodes."""
+    weights = ("VEC4", 5126, np.tile([1, 0, 0, 0], (vertices, 1)))
+    arrays = buffered(
+        ("VEC3", 5126, np.random.default_rng(0).normal(size=(vertices, 3))),
+        ("VEC4", 5123, np.zeros((vertices, 4))),
+        weights,
+        ("SCALAR", 5126, [0, 1]),
+        ("VEC3", 5126, np.eye(3)[:2]),
+    )
+    attributes = {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    node = {"mesh": 0, "skin": 0} if skinned else {"mesh": 0}
+    return text(
+        {
+            "scenes": [{"nodes": list(range(count + 1))}],
+            "nodes": [{}] + [node] * count,
+            "skins": [{"joints": [0]}],
+            **arrays,
+            "meshes": [{"primitives": [{"attributes": attributes}]}],
+            "animations": [{"samplers": [{"input": 3, "output": 4}], "channels": [channel]}],
+        }
+    )
+
+
+@pytest.mark.parametrize("skinned", [True, False])
+@pytest.mark.parametrize("line", ["optimize IN out.glb", "bake IN out.npz --rigid", "render IN out.png", "collapse IN"])
+def test_vertices_of_all_instances_count(line: str, skinned: bool, call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.gltf"
+    path.write_bytes(of_instances(20_000, 2000, skinned=skinned))
+    names = {"IN": path, "out.glb": tmp_path / "out.glb", "out.npz": tmp_path / "o.npz", "out.png": tmp_path / "o.png"}
+    said = refusal(call(*(names.get(word, word) for word in line.split())), 4)
+    assert "would take 16 GB or more (limit 1 GB)" in said
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_measures_at_nodes_then_says_so(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.gltf"
+    path.write_bytes(of_instances(20_000, 2000, skinned=True))
+    assert "vertices-unread" in call("inspect", path).text
+    said = call("loop", path, tmp_path / "out.glb", "--blend", "0.1").err
+    assert "measured at nodes, not on the surface" in said
+    assert "(raise --memory-limit, or split the file)" in said
+
+
+def test_frames_of_a_picture_count(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.gltf"
+    path.write_bytes(of_instances(10, 2000, skinned=True))
+    line = ["render", path, tmp_path / "out.png", "--size", "64", "--memory-limit", "10MB", "--frames"]
+    call(*line, "4").product()
+    assert "would take" in refusal(call(*line, "100"), 4)
+
+
 @pytest.mark.parametrize("line", ["resample IN out.glb --fps 5", "optimize IN out.glb", "inspect IN", "check IN"])
 @pytest.mark.parametrize(("count", "keys", "shared"), [(200, 500_000, False), (2000, 50_000, True)])
 def test_outputs_of_an_animation_count_in_all(

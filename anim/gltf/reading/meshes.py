@@ -15,6 +15,7 @@ from anim.gltf.reading.skin_weights import read_influences
 from anim.gltf.validation.buffer_layout import DRACO
 from anim.model import Mesh, PrimitiveRange
 
+BYTES_PER_POSED_VERTEX = 400  # of each instance of a mesh, while it is measured or baked
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
 
 
@@ -94,6 +95,7 @@ class Meshes:
             parts.append(read[text])
         if len(parts) == 1:
             return parts[0]
+        self._accessors.budget.check(BYTES_PER_POSED_VERTEX * sum(len(part.positions) for part in parts))
         self._accessors.budget.add(sum(map(_num_bytes, parts)))
         return _join(parts, len(parts[0].targets) if parts else 0)
 

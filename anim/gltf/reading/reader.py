@@ -11,7 +11,7 @@ from anim.errors import AnimError, FormatError, ShapeError, UnsupportedError
 from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.meshes import Meshes
+from anim.gltf.reading.meshes import BYTES_PER_POSED_VERTEX, Meshes
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, MorphedNode, Scene, Skeleton, Skin
 
@@ -126,6 +126,7 @@ def scene(
         skin = skins[node["skin"]] if "skin" in node else None
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
+    accessors.budget.check(BYTES_PER_POSED_VERTEX * sum(len(each.mesh.positions) for each in instances))
     return Scene(_skeleton(document, parents) if skeleton is None else skeleton, tuple(instances))
 
 

@@ -93,7 +93,7 @@ class Solution:
 
 
 def _stored_values(track: Track) -> tuple[object, ...]:
-    """What is equal for tracks whose values are stored equally."""
+    """Storage and values of a track: equal for tracks whose values are stored once."""
     parts = (track.values, track.in_tangents, track.out_tangents)
     return (track.storage, *(part.tobytes() for part in parts if part is not None))
 

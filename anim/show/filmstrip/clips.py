@@ -14,6 +14,7 @@ from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf.document import Document
 from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading import reader
+from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import read_materials
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, VertexCache
 from anim.show.filmstrip import palette, root_path
@@ -27,6 +28,7 @@ from anim.skinning.methods.registry import SKINNING_METHODS
 
 MAX_LOADED_BYTES = 48_000_000  # positions of frames that are baked once for all uses: of MAX_FRAMING_VERTICES
 NUM_FRAMING_FRAMES = 48  # frames of the whole motion for the framing of the camera
+BYTES_PER_FACE = 250  # corners on the screen twice, with colors
 MIN_FRAMING_FRAMES = 8  # of these, of meshes with MAX_FRAMING_VERTICES in few frames
 MAX_FRAMING_VERTICES = 4_000_000  # positions of all framing frames
 STICK_CORNERS = np.array([0, 3, 2, 1, 7, 13])  # of 24: start, end and the ring
@@ -89,12 +91,15 @@ def of_document(
     when.check(min((clip.start for clip in moving), default=0.0), max((clip.end for clip in moving), default=0.0))
     found: list[FilmstripClip] = []
     bakers: dict[str, Baker] = {}
+    budget = Accessors(document).budget
+    budget.add(BYTES_PER_FACE * sum(len(instance.mesh.faces) for instance in scene.instances))
     for number, clip in chosen:
         start, end = (clip.start, clip.end) if clip.tracks else (0.0, 0.0)
         times, path = when.times(start, end), _framing_times(start, end, count)
         if not len(times):
             continue
         for method in methods or ("lbs",):
+            budget.add(12 * len(times) * scene.vertex_count)
             if method not in bakers:
                 bakers[method] = prepare_bake(scene, method=method, rigid=True)
             cache = _load_small(bakers[method].bake(clip, times=times))

@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 
+MAX_BATCH_FACES = 1 << 18  # triangles set up at a time: 500 bytes each
 MAX_BATCH_ROWS = 1 << 20  # rows of triangles drawn at a time
 MAX_BATCH_PIXELS = 1 << 16  # pixels of these rows at a time: temporary arrays fit into the processor's cache
 MAX_OVERDRAW = 32  # triangles per pixel, on average, above which equal ones are drawn once
@@ -30,19 +31,19 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
     """
     seen: Ints = np.full(height * width, -1, np.int64)
     nearest = np.full(height * width, -np.inf)
+    faces = np.arange(len(corners))
     if alpha_test is None and _area(corners) > MAX_OVERDRAW * height * width:
-        distinct = _last_of_equal(corners)
-        shares, near, chosen = _planes(corners[distinct])
-        chosen = distinct[chosen]
-    else:
-        shares, near, chosen = _planes(corners)
-    y = corners[chosen, :, 1]
-    first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
-    last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
-    rows = np.maximum(last - first + 1, 0)
-    for some in _batches(rows, MAX_BATCH_ROWS):
-        owner, line = _expand(first[some], rows[some])
-        _draw(owner + some.start, line, shares, near, chosen, seen, nearest, width, alpha_test)
+        faces = _last_of_equal(corners)
+    for start in range(0, len(faces), MAX_BATCH_FACES):
+        drawn = faces[start : start + MAX_BATCH_FACES]
+        shares, near, chosen = _planes(corners[drawn])
+        y = corners[drawn[chosen], :, 1]
+        first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
+        last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
+        rows = np.maximum(last - first + 1, 0)
+        for some in _batches(rows, MAX_BATCH_ROWS):
+            owner, line = _expand(first[some], rows[some])
+            _draw(owner + some.start, line, shares, near, drawn[chosen], seen, nearest, width, alpha_test)
     return seen.reshape(height, width)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.show.filmstrip.camera import Camera
-from anim.show.filmstrip.rasterizer import visible_faces
+from anim.show.filmstrip.rasterizer import MAX_BATCH_FACES, visible_faces
 from anim.show.filmstrip.surface_pattern import SurfaceMarks
 
 if TYPE_CHECKING:
@@ -140,6 +140,14 @@ def _enlarge(camera: Camera, times: int) -> Camera:
 
 def _shade(camera: Camera, positions: Floats, faces: Ints) -> Floats:
     """Brightness (T,) of faces: key light, fill light and sky."""
+    result = np.empty(len(faces))
+    for start in range(0, len(faces), MAX_BATCH_FACES):
+        some = slice(start, start + MAX_BATCH_FACES)
+        result[some] = _shade_some(camera, positions, faces[some])
+    return result
+
+
+def _shade_some(camera: Camera, positions: Floats, faces: Ints) -> Floats:
     a, b, c = (positions[faces[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -26,6 +26,7 @@ def test_batches_of_pixels_draw_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(rasterizer, "_draw_pixels", called)
     monkeypatch.setattr(rasterizer, "MAX_BATCH_PIXELS", 100)
+    monkeypatch.setattr(rasterizer, "MAX_BATCH_FACES", 7)
     found = rasterizer.visible_faces(corners, width=40, height=30)
     assert np.array_equal(found, expected)
     assert max(sizes) <= 100 < sum(sizes)
