@@ -15,7 +15,7 @@ from anim.gltf.reading.skin_weights import read_influences
 from anim.gltf.validation.buffer_layout import DRACO
 from anim.model import Mesh, PrimitiveRange
 
-BYTES_PER_POSED_VERTEX = 400  # of each instance of a mesh, while it is measured or baked
+BYTES_PER_POSED_VERTEX = 600  # of each instance of a mesh, while it is measured or baked
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = range(7)
 
 
