@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import asdict
 from enum import StrEnum
@@ -91,7 +92,12 @@ def command(
         smooth.append(tracks_of_clips)
         refused += [_named(fault, inspected.name) for fault in inspected.facts.faults[:1]]
     if format is Format.JSON:
-        documents.write_text(_json(done, smooth))
+        try:
+            text = _json(done, smooth)
+        except FormatError:
+            refused += _refuse_infinite(paths, done, smooth)
+            text = _json(done, smooth)
+        documents.write_text(text)
     elif format is Format.CSV:
         documents.write_text(_csv(done, smooth, tracks=tracks, continuity=continuity))
     elif not quiet:
@@ -172,18 +178,29 @@ def _smooth(contents: FileContents, facts: Facts) -> Smoothness:
 
 
 def _json(done: list[Inspected], smooth: list[Smoothness]) -> str:
-    files = [{"file": each.name, "bytes": each.file_bytes, **_plain(each)} for each in done]
-    if any(smooth):
-        _add_smoothness(files, smooth)
-    return json_report.dump({"schema": SCHEMA, "files": files})
+    return json_report.dump({"schema": SCHEMA, "files": [*map(_entry, done, smooth)]})
 
 
-def _add_smoothness(files: list[dict[str, Any]], smooth: list[Smoothness]) -> None:
-    from cli.reports import continuity_report
+def _entry(inspected: Inspected, smooth: Smoothness) -> dict[str, Any]:
+    """Entry of a file in the JSON."""
+    entry = {"file": inspected.name, "bytes": inspected.file_bytes, **_plain(inspected)}
+    if smooth:
+        from cli.reports import continuity_report
 
-    for file, of_clips in zip(files, smooth, strict=True):
-        for clip, tracks in zip(file["clips"], of_clips, strict=False):
+        for clip, tracks in zip(entry["clips"], smooth, strict=False):
             clip["continuity"] = [continuity_report.json(track) for track in tracks]
+    return entry
+
+
+def _refuse_infinite(paths: list[str], done: list[Inspected], smooth: list[Smoothness]) -> Iterator[AnimError]:
+    """Replace reports that JSON can't hold by those of unreadable files: the others' are kept. Yield the errors."""
+    for i, path in enumerate(paths):
+        try:
+            json_report.check_finite(_entry(done[i], smooth[i]))
+        except FormatError as error:
+            name = done[i].name
+            done[i], smooth[i] = _unreadable(path, error), ()
+            yield _named(error, name)
 
 
 def _plain(inspected: Inspected) -> dict[str, Any]:

@@ -14,10 +14,16 @@ def dump(content: object, *, indent: int | None = 1) -> str:
     try:
         return json.dumps(content, allow_nan=False, ensure_ascii=indent is None, indent=indent) + "\n"
     except ValueError:
-        where, value = next(_not_finite(content, ""), ("a number", math.nan))
+        check_finite(content)
+        raise
+
+
+def check_finite(content: object) -> None:
+    """Raise FormatError, with the path of the number, if a report contains NaN or infinity."""
+    for where, value in _not_finite(content, ""):
         raise FormatError(
             f"{where} is {value}: no report of it is possible", help="the file has values beyond those of float32"
-        ) from None
+        )
 
 
 def _not_finite(value: object, path: str) -> Iterator[tuple[str, float]]:

@@ -42,10 +42,19 @@ def test_frames_beyond_float32_are_refused(line: list[str], huge: Path, call: Ca
     assert "frame 0: vertex 2 is beyond float32" in refusal(call(command, huge, *others), 3)
 
 
-@pytest.mark.parametrize("command", ["inspect", "loop"])
-def test_a_report_of_infinity_is_refused(command: str, huge: Path, call: Call) -> None:
-    said = refusal(call(command, huge, "--format", "json"), 3)
+def test_a_report_of_infinity_is_refused(huge: Path, call: Call) -> None:
+    said = refusal(call("loop", huge, "--format", "json"), 3)
     assert "no report of it is possible" in said
+
+
+def test_infinity_in_one_file_does_not_cost_the_entries_of_others(huge: Path, asset: Find, call: Call) -> None:
+    plain = asset("SimpleSkin.gltf")
+    run = call("inspect", huge, plain, "--format", "json", "--continuity")
+    bad, good = json.loads(run.out)["files"]
+    assert run.code == 3
+    assert f"{huge}: clips[0].seam_speed_m_per_s is nan: no report of it is possible" in run.err
+    assert "clips[0].seam_speed_m_per_s is nan" in bad["error"]
+    assert good == json.loads(call("inspect", plain, "--format", "json", "--continuity").product())["files"][0]
 
 
 def test_the_first_number_that_json_cannot_hold_is_named() -> None:
