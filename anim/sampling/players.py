@@ -96,13 +96,15 @@ def _mix(player: PlayerModel, keys: Floats, left: Ints, u: Floats) -> Floats:
         a, b, left = keys[left], keys[left + 1], np.arange(len(left))
     b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
     theta, divided = player.arc(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0))
-    if theta.any():
+    if not u.any():  # all at keys
+        mixed = a[left]
+    elif theta.any():
         angle = (theta / np.pi)[left]
         whole = np.sinc(angle)
         of_a, of_b = (1 - u) * np.sinc((1 - u) * angle) / whole, u * np.sinc(u * angle) / whole
+        mixed = of_a[..., None] * a[left] + of_b[..., None] * b[left]
     else:
-        of_a, of_b = 1 - u, u
-    mixed = of_a[..., None] * a[left] + of_b[..., None] * b[left]
+        mixed = (1 - u)[..., None] * a[left] + u[..., None] * b[left]
     divided = divided[left]
     if divided.any():
         mixed[divided] = quaternion.normalize(mixed[divided])

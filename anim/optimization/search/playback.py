@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
-from anim.sampling.track import KeyInterval
+from anim.sampling.track import MAX_MIXED_VALUES, KeyInterval
 from anim.sampling.world import local_matrices
 
 EPSILON = np.finfo(np.float64).eps
@@ -17,16 +18,25 @@ EPSILON = np.finfo(np.float64).eps
 
 def slerp_raw(keys: Floats, place: KeyInterval) -> Floats:
     """Return slerp (W, G, 4) between stored quaternions (K, G, 4), not normalized, as in three.js."""
-    here = np.arange(len(keys) - 1)
-    a, b = keys[here], keys[here + 1]
+    a, b = keys[:-1], keys[1:]
     b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
     theta = 2 * np.arctan2(_length(b - a), _length(b + a))  # (K - 1, G)
     left = np.minimum(place.left, max(len(keys) - 2, 0))
     u = np.where(place.left == left, place.u, 1.0)[:, None]
-    theta = theta[left]
-    whole = _sine_ratio(theta)
-    of_a = (1 - u) * _sine_ratio((1 - u) * theta) / whole
-    of_b = u * _sine_ratio(u * theta) / whole
+    shown = np.empty((len(u), *keys.shape[1:]))
+    count = max(MAX_MIXED_VALUES // max(math.prod(keys.shape[1:]), 1), 1)
+    for first in range(0, len(shown), count):
+        some = slice(first, first + count)
+        shown[some] = _slerp(a, b, theta, left[some], u[some])
+    return shown
+
+
+def _slerp(a: Floats, b: Floats, theta: Floats, left: Ints, u: Floats) -> Floats:
+    """Slerp (F, G, 4) between keys `left` (F,) of a and b (K, G, 4), `theta` (K, G) rad apart, at u (F, 1)."""
+    angle = theta[left]
+    whole = _sine_ratio(angle)
+    of_a = (1 - u) * _sine_ratio((1 - u) * angle) / whole
+    of_b = u * _sine_ratio(u * angle) / whole
     return np.asarray(of_a[..., None] * a[left] + of_b[..., None] * b[left])
 
 

@@ -29,16 +29,20 @@ class SegmentErrors:
         tracks, count, _ = values.shape
         self._count = count
         span = _span(times)
-        # errors[e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
-        self._errors = np.full((count, tracks, span), np.inf, np.float32)
+        errors = np.empty((span, count, tracks), np.float32)  # in the order of the loop: what it leaves takes no memory
         bent = np.arange(tracks)
         components = np.ascontiguousarray(np.moveaxis(values, -1, 0))
-        for n in range(span):
-            error = _segment_error(components, times, n + 1)
-            self._errors[n + 1 :, bent, n] = error.T
+        longest = 0
+        while longest < span and len(bent):
+            longest += 1
+            error = _segment_error(components, times, longest)
+            errors[longest - 1] = np.inf
+            errors[longest - 1, longest:, bent] = error
             kept = (error <= limit).any(axis=1)  # longer segments of the others nearly all exceed it too
             if not kept.all():
                 bent, components = bent[kept], components[:, kept]
+        # [e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
+        self._errors = errors[:longest].transpose(1, 2, 0)
 
     def greedy_keys(self, tracks: Ints, budgets: Floats) -> Bools:
         """Return the keys (k, K) of the `tracks` (k,) so that no segment's error exceeds the budget (k,) in m."""

@@ -121,3 +121,10 @@ def test_only_ancestors_are_needed() -> None:
     tree = skeleton([-1, 0, 1, 1, -1])
     assert [level.tolist() for level in required_levels(tree, np.array([3]))] == [[0], [1], [3]]
     assert required_levels(tree, np.array([4]))[0].tolist() == [4]
+
+
+def test_many_times_are_played_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    keys, place = _turns(3), find_interval(KEYS, AT)
+    whole = playback.slerp_raw(keys, place)
+    monkeypatch.setattr(playback, "MAX_MIXED_VALUES", 50)
+    np.testing.assert_array_equal(playback.slerp_raw(keys, place), whole)

@@ -127,3 +127,13 @@ def test_segments_beyond_the_limit_are_not_looked_at() -> None:
     for track in range(4):
         keep = limited.greedy_keys(np.array([track]), np.array([10.0]))[0]
         assert _missed(values[track], times, keep) <= 10
+
+
+def test_a_limit_keeps_the_keys_of_budgets_below_it() -> None:
+    values, times = _random(5, 300)
+    budgets = np.array([0.5, 1, 0.01, 1e-6])
+    tables = [SegmentErrors(values, times, limit) for limit in (np.inf, 1.0, 1e-6)]
+    whole, limited = (each.greedy_keys(np.arange(4), budgets) for each in tables[:2])
+    np.testing.assert_array_equal(limited, whole)
+    assert tables[2].greedy_keys(np.arange(4), np.full(4, 1e-6)).all()
+    assert [each._errors.shape[2] for each in tables][2] == 2, "errors of longer segments are not kept in memory"
