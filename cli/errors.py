@@ -144,4 +144,5 @@ def _print_error(problem: str, hint: str) -> None:
 
 
 def _print_trace() -> None:
-    Reporter().info(traceback.format_exc().rstrip("\n"))
+    for line in traceback.format_exc().rstrip("\n").split("\n"):
+        Reporter().info(line)

@@ -28,9 +28,9 @@ class Reporter:
     warnings: list[str] = field(default_factory=list, compare=False)
 
     def info(self, line: str) -> None:
-        """Write a line to stderr, cut if very long, unless quiet."""
+        """Write a line to stderr unless quiet: cut if very long, and one line whatever names of a file contain."""
         if not self.quiet:
-            self._write("\n".join(escape_control(cut_middle(each, MAX_LINE_LENGTH)) for each in line.split("\n")))
+            self._write(escape_control(cut_middle(line, MAX_LINE_LENGTH)))
 
     def _write(self, line: str) -> None:
         if (step := step_streams()) is not None:
@@ -47,8 +47,8 @@ class Reporter:
 
     def verbose_info(self, line: str) -> None:
         """Write a line to stderr if details are requested."""
-        if self.verbose and not self.quiet:
-            self._write(line)
+        if self.verbose:
+            self.info(line)
 
 
 def format_bytes(count: int) -> str:

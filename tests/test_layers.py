@@ -84,7 +84,7 @@ PUBLIC = {
     "gltf.io": "buffers container images json_text lenient source uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader vertex_colors",
-    "gltf.validation": "animation_storage buffer_layout channel_targets hierarchy rules schema",
+    "gltf.validation": "animation_storage buffer_layout channel_targets extensions hierarchy rules schema",
     "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
     "measure.compare": "diff equal_scenes name_matching vertex_distance",
     "measure.continuity": "continuity knots",

@@ -30,6 +30,7 @@ from anim.gltf.io.source import (
     open_file,
     write_file,
 )
+from anim.gltf.validation.extensions import unknown_required
 from cli import tables
 from cli.errors import UsageError
 from cli.io import depfile, output_names, stdout
@@ -50,6 +51,7 @@ def source(path: str, reporter: Reporter = AUDIBLE, opener: Opener = container.r
     try:
         found = open_bytes(_stdin(resolver.read_gltf), name, opener) if path == PIPE else _open_file(path, opener)
         repaired_note(found.document, name, reporter)
+        _note_unknown_extensions(found.document, name, reporter)
         yield found
     except (UsageError, OutputError):
         raise
@@ -82,6 +84,12 @@ def repaired_note(document: Document, name: str, reporter: Reporter) -> None:
     words = (f" and {more} more have", "them") if more else (" has", "it")
     problem = f"{node_label(document.json, first)}{words[0]} a matrix although a clip animates {words[1]}"
     reporter.info(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
+
+
+def _note_unknown_extensions(document: Document, name: str, reporter: Reporter) -> None:
+    if unknown := unknown_required(document.json):
+        words = f"requires {', '.join(unknown)}, not supported here: kept as it is, and nothing is measured with it"
+        reporter.info(f"note: {name}: {words}")
 
 
 def write(

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from cli.errors import UsageError
+from cli.tables import cut_middle
 
 NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
 Keys: TypeAlias = Mapping[str, type | tuple[type, ...]]  # allowed keys, and the types of their values
+TYPE_NAMES = {str: "text", bool: "true or false", int: "a whole number", list: "a list", dict: "a table"}
 SECTIONS: Keys = {"check": dict, "budget": list, "recipe": list}
 
 
@@ -47,8 +49,8 @@ def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
             raise UsageError(f"{path}: unknown key '{where}'", help=f"did you mean {near[0]}?" if near else "")
         kind = known[key]
         if not isinstance(value, kind):
-            expected = kind.__name__ if isinstance(kind, type) else "a number"
-            raise UsageError(f"{path}: {where} is {type(value).__name__} (expected {expected})")
+            expected = TYPE_NAMES[kind] if isinstance(kind, type) else "a number"
+            raise UsageError(f"{path}: {where} is {cut_middle(repr(value))} (expected {expected})")
         if isinstance(value, float) and not math.isfinite(value):  # a limit that no file exceeds
             raise UsageError(f"{path}: {where} is {value} (expected a finite number)")
 

@@ -28,7 +28,7 @@ def test_settings_come_from_the_nearest_file_upwards(folder: Path, call: Call) -
     [
         ("[check]\nselct = []\n", "unknown key 'check.selct'"),
         ("[checks]\n", "did you mean check?"),
-        ('[check]\nselect = "GA1"\n', "check.select is str (expected list)"),
+        ('[check]\nselect = "GA1"\n', "check.select is 'GA1' (expected a list)"),
         ('[check]\nfail-on = "bad"\n', "expected one of error, warning, info"),
         ('[check]\nselect = ["GA999"]\n', "gltf-anim.toml: there is no rule 'GA999'"),
         ('[check]\ntarget = "nobody"\n', "there is no target"),
@@ -110,7 +110,7 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     ("text", "words"),
     [
         ('match = "*"\nbyte = 3', "did you mean bytes?"),
-        ('match = "*"\nbytes = "3 MB"', "budget.bytes is str (expected a number)"),
+        ('match = "*"\nbytes = "3 MB"', "budget.bytes is '3 MB' (expected a number)"),
         ('match = "*"\nbytes = nan', "budget.bytes is nan (expected a finite number)"),
         ("bytes = 3", "has no match"),
         ('match = "*"\nerror = "1mm"', "has no against"),

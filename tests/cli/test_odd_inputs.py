@@ -270,5 +270,28 @@ def test_control_characters_of_names_are_escaped_in_summaries(call: Call, tmp_pa
     assert "\x1b" not in run.err
 
 
+def test_line_breaks_of_names_break_no_line(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "a.gltf"
+    clip = {**animated(times=[0, 1])["animations"][0], "name": "two\nlines"}
+    path.write_bytes(text({**animated(times=[0, 1]), "animations": [clip]}))
+    run = call("trim", path, tmp_path / "out.glb", "--to", "0.5")
+    assert run.code == 0, run.err
+    assert "'two\\nlines'" in run.err
+    assert len(run.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["trim --to 0.5", "optimize", "resample --fps 5"])
+def test_an_extension_that_is_required_and_unknown_is_noted(command: str, call: Call, tmp_path: Path) -> None:
+    path, out = tmp_path / "a.gltf", tmp_path / "out.gltf"
+    required = {"extensionsRequired": ["ACME_sky"], "extensionsUsed": ["ACME_sky"]}
+    path.write_bytes(text({**animated(times=[0, 1]), **required}))
+    name, *options = command.split()
+    run = call(name, path, out, *options)
+    assert run.code == 0, run.err
+    assert "requires ACME_sky, not supported here" in run.err
+    assert json.loads(out.read_text())["extensionsRequired"] == ["ACME_sky"]
+    assert "ACME_sky" not in call(name, path, out, *options, "--quiet").err
+
+
 def test_a_size_beyond_all_files_is_no_limit(walk: Path, call: Call, tmp_path: Path) -> None:
     call("optimize", walk, tmp_path / "out.glb", "--effort", "fast", "--max-bytes", "1e300GB").product()

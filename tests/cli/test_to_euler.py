@@ -157,3 +157,10 @@ def test_a_file_without_nodes_is_written_without_any(suffix: str, call: Call, tm
     (tmp_path / "in.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "animations": [clip_of_none]}))
     call("to-euler", tmp_path / "in.gltf", tmp_path / f"out.{suffix}").product()
     assert (tmp_path / f"out.{suffix}").stat().st_size
+
+
+def test_scales_that_only_repeat_the_rest_pose_are_not_missed(asset: Find, call: Call, tmp_path: Path) -> None:
+    """Within 1e-6, in files of exporters that write them for every node."""
+    run = call("to-euler", asset("CesiumMan.glb"), tmp_path / "out.bvh")
+    assert run.code == 0
+    assert "left out" not in run.err

@@ -7,22 +7,14 @@ from collections.abc import Iterator
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule
-
-KNOWN_REQUIRED = frozenset(
-    """
-    EXT_mesh_gpu_instancing EXT_meshopt_compression EXT_texture_webp KHR_animation_pointer KHR_draco_mesh_compression
-    KHR_lights_punctual KHR_materials_unlit KHR_mesh_quantization KHR_meshopt_compression KHR_node_visibility
-    KHR_texture_basisu KHR_texture_transform
-    """.split()  # noqa: SIM905 (one name per line would hide the words)
-)
+from anim.gltf.validation.extensions import unknown_required
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the extensions."""
-    for name in file.json.get("extensionsRequired", ()):
-        if name not in KNOWN_REQUIRED:
-            problem = f"{name} is required but not supported here"
-            yield Occurrence("extensionsRequired", "/extensionsRequired", problem=problem, name=name)
+    for name in unknown_required(file.json):
+        problem = f"{name} is required but not supported here"
+        yield Occurrence("extensionsRequired", "/extensionsRequired", problem=problem, name=name)
 
 
 RULE = Rule(

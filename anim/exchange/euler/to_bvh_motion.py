@@ -18,7 +18,7 @@ from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
 from anim.maths.hierarchy import with_ancestors, with_descendants
-from anim.model import Clip, Skeleton, TimeAxis
+from anim.model import Clip, Skeleton, TimeAxis, Track
 from anim.model.skeleton import nearest_ancestors
 from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
 from anim.sampling.times import check_duration, check_fps
@@ -28,6 +28,7 @@ from anim.units import format_number
 GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
 NOTED_ERROR_DEG = 1.0  # degrees, of rotations between frames
+SCALE_ROUNDING = 1e-5  # of a scale, in keys of bakes: matrices that were taken apart in float32
 CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
 BLOCK_VALUES = 1 << 17  # nodes × frames computed at a time
 BRACES = "{}"
@@ -223,10 +224,19 @@ def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int])
     lost = [
         track
         for track in clip.tracks
-        if track.path not in ("translation", "rotation") or track.node is None or not carrying[track.node]
+        if (track.path not in ("translation", "rotation") and not _keeps_scale(skeleton, track))
+        or track.node is None
+        or not carrying[track.node]
     ]
     names = labels(skeleton) if lost else []
     return [label_of(track, names) for track in lost]
+
+
+def _keeps_scale(skeleton: Skeleton, track: Track) -> bool:
+    """Return whether a track only repeats the scale at rest, as exporters write it for every node."""
+    if track.path != "scale" or track.node is None:
+        return False
+    return bool(np.abs(track.values - skeleton.scale[track.node]).max() <= SCALE_ROUNDING * skeleton.scale.max())
 
 
 def _by_curve(values: Floats) -> Floats:

@@ -90,7 +90,7 @@ def _parse_rows(lines: list[str], body: int) -> Floats:
     for number, line in enumerate(lines[body:], body + 1):
         for place, text in enumerate(line.split(), 1):
             if number_of(text) is None:
-                fail(number, f"number {place} is '{text[:40]}' (expected a finite number)")
+                fail(number, f"number {place} is '{text[:40]}' (expected a number up to {MAX_NUMBER:g})")
     raise AssertionError
 
 

@@ -76,6 +76,8 @@ class _Parser:
                 open_joints.pop()
             elif keyword in ("root", "joint", "end"):
                 open_joints.append(self._joint(keyword, word.line, open_joints))
+            elif not open_joints and keyword == "motion":
+                fail(word.line, "'MOTION' is in a line with other words (expected it alone)")
             elif not open_joints:
                 fail(word.line, f"'{_short(word.text)}' stands outside any joint (expected ROOT or MOTION)")
             elif keyword == "offset":

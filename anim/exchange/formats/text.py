@@ -58,7 +58,7 @@ def parse_cell(text: str, line: int, what: str) -> float:
     """Return the number in a cell. Raises FormatError with the line."""
     value = parse_number(text)
     if value is None:
-        raise error_at(line, f"{what} is '{text[:40]}' (expected a finite number)")
+        raise error_at(line, f"{what} is '{text[:40]}' (expected a number up to {MAX_NUMBER:g})")
     return value
 
 
