@@ -165,6 +165,7 @@ def test_texture_coordinates_sample_the_same_texels(call: Call, source: Path) ->
     assert found == pytest.approx(np.stack((expected[:, 0], 1 - expected[:, 1]), axis=1), abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["usdc", "usdz"])
 def test_back_again(call: Call, source: Path, ending: str) -> None:
     out, back, truth = (source.with_name(name) for name in (f"a.{ending}", "back.npz", "truth.npz"))

@@ -80,6 +80,7 @@ def codes(report: dict[str, Any]) -> set[str]:
     return {each["code"] for each in report["issues"]["messages"] if each["severity"] == 0}
 
 
+@pytest.mark.slow
 @needs_validator
 def test_files_with_errors_are_those_that_the_validator_refuses(call: Call) -> None:
     paths = sorted(path for path in ASSETS.rglob("*") if path.suffix in (".glb", ".gltf", ".vrm", ".vrma"))

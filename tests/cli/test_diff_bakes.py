@@ -24,6 +24,7 @@ def source(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", FORMATS)
 def test_every_format_is_within_its_error(call: Call, source: Path, ending: str) -> None:
     """At 64 frames per second linear interpolation misses the arc by less than a millimetre."""

@@ -41,6 +41,7 @@ def test_what_gltfpack_does_by_default_is_seen(name: str, asset: Find, tmp_path:
     assert call("diff", asset(name), default, "--fail-above", "1%").code == 6
 
 
+@pytest.mark.slow
 def test_quantized_meshes_are_not_motion(asset: Find, tmp_path: Path, call: Call) -> None:
     quantized = _peer(tmp_path, "gltf-transform", "quantize", asset("Fox.glb"), tmp_path / "q.glb")
     found = call("diff", asset("Fox.glb"), quantized, "--format", "json").json

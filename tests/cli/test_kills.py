@@ -86,6 +86,7 @@ PAIRS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", HOWS)
 @pytest.mark.parametrize("case", PAIRS, ids=lambda case: case.__name__)
 def test_a_pair_is_the_old_one_or_the_new_one(

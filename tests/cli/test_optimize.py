@@ -152,6 +152,7 @@ def test_a_gltf_gets_its_bin(fixture: Fixture, tmp_path: Path, call: Call) -> No
     assert apart(call, fixture("noop"), output)["max_error_percent"] <= 0.01
 
 
+@pytest.mark.slow
 def test_a_gltf_beside_its_source_is_optimized_too(tmp_path: Path, fixture: Fixture, call: Call) -> None:
     """What counts is the .gltf with its .bin, wherever that lies."""
     assert call("convert", fixture("biped"), tmp_path / "a.gltf").code == 0

@@ -85,6 +85,7 @@ def test_a_row_shows_the_times_that_its_clip_has(asset: Find, call: Call, tmp_pa
     assert height("--clip", "*", "--at", "0.5") > height("--clip", "*", "--at", "0.9")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.npz", "a.mdd", "a.ply", "a.usdc", "a.exr", "a.glb"])
 def test_caches(name: str, call: Call, tmp_path: Path) -> None:
     for file, data in written(cache(), name)[0].files.items():
@@ -178,6 +179,7 @@ def _npz() -> bytes:
     return written(cache(), "a.npz")[0].files["a.npz"]
 
 
+@pytest.mark.slow
 def test_meshes_are_chosen_and_hidden(asset: Find, call: Call) -> None:
     def drawn(*args: str) -> bytes:
         run = call("render", asset("Knight.glb"), "-", "--clip", "Idle", "--frames", "1", *SMALL, *args)

@@ -199,6 +199,7 @@ def test_two_runs_give_the_same_bytes(biped: bytes, call: Call) -> None:
     assert runs[0] == runs[1]
 
 
+@pytest.mark.slow
 def test_its_own_output_keeps_its_keys(biped: bytes, call: Call) -> None:
     once = call("resample", "-", "-", "--fps", "50", stdin=biped).product()
     twice = call("resample", "-", "-", "--fps", "50", stdin=once).product()

@@ -61,6 +61,7 @@ COLLIDERS = {
 }
 
 
+@pytest.mark.slow
 def test_cloth_meets_colliders_of_a_file_and_of_nodes(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     out, report, given = tmp_path / "out.npz", tmp_path / "report.json", tmp_path / "colliders.json"
     given.write_text(json.dumps(COLLIDERS))

@@ -13,7 +13,6 @@ from anim.sampling.track import sample
 from tests.anim.simulation.rigid_bodies.cases import collider, document, node
 from tests.cli.conftest import Call, Fixture
 from tests.cli.playing import Player
-from tests.files import mark_slow
 from tests.judge import judge, needs_judge, vertices
 from tests.khronos import errors, needs_validator, validate
 
@@ -51,6 +50,7 @@ def test_a_skin_moves_its_vertices_as_the_nodes_move_their_mesh(fixture: Fixture
             np.testing.assert_allclose(moved, expected, atol=2e-6)
 
 
+@pytest.mark.slow
 @needs_judge
 def test_three_js_shows_both_forms_alike(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     paths = [tmp_path / f"{form}.glb" for form in ("node", "skin")]
@@ -63,8 +63,9 @@ def test_three_js_shows_both_forms_alike(fixture: Fixture, call: Call, tmp_path:
         np.testing.assert_allclose(a, b, atol=2e-6)
 
 
+@pytest.mark.slow
 @needs_judge
-@pytest.mark.parametrize("form", mark_slow(["node", "skin"], slow=["node"]))
+@pytest.mark.parametrize("form", ["node", "skin"])
 def test_three_js_measures_the_error_of_removed_keys(form: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
     args = (*SPARKS, "--drag", "1", "--turbulence", "1", "--as", form)
     simulate(call, fixture("biped"), tmp_path / "full.glb", *args)

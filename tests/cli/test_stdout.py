@@ -104,6 +104,7 @@ def test_a_full_folder_for_temporary_files_is_named(walk: Path, tmp_path: Path) 
     assert refusal(shell(f"{LIMIT} 100; {line}", tmp_path), 3).startswith(f"gltf-anim: {tmp_path}/")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["usdc", "exr"])
 def test_room_for_temporary_files_can_end(ending: str, walk: Path, tmp_path: Path) -> None:
     """Of stdin, which is read more than once, and of packages that write only by name."""

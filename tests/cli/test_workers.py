@@ -72,7 +72,8 @@ def test_a_killed_worker_is_one_line_that_names_a_clip(which: int, asset: Find, 
 SIGNALS = [("TERM", 143), ("HUP", 129), ("INT", 130), ("KILL", -9)]
 
 
-@pytest.mark.parametrize(("number", "code"), mark_slow(SIGNALS, slow=[("HUP", 129), ("INT", 130)]))
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), SIGNALS)
 def test_nobody_works_on_when_the_command_was_stopped(number: str, code: int, asset: Find, tmp_path: Path) -> None:
     if number != "KILL" and signal.getsignal(signal.Signals[f"SIG{number}"]) is signal.SIG_IGN:
         pytest.skip(f"SIG{number} is ignored here, as under nohup")

@@ -35,6 +35,7 @@ def test_rigs_are_sound(seed: int) -> None:
     assert reader.scene(document).instances
 
 
+@pytest.mark.slow
 def test_another_motion_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A judge that accepts everything finds nothing: here the output is a rig with a node elsewhere."""
     monkeypatch.chdir(tmp_path)

@@ -56,6 +56,7 @@ def _positions(text: str) -> tuple[list[str], np.ndarray[tuple[int, ...], np.dty
     return list(converted.skeleton.names), world[..., 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_joints_stand_where_a_plain_loop_puts_them(name: str, asset: Find) -> None:
     """Through the written GLB, at every frame, to 1e-5 of the height."""

@@ -27,6 +27,7 @@ ROUNDING = 1 + 1e-12
 ROBOT = pytest.param("Robot.glb", 2, marks=pytest.mark.slow)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 100_000), st.sampled_from(ALL))
 @settings(max_examples=5)
 def test_nothing_moves_further_at_any_time(seed: int, player: str) -> None:

@@ -36,6 +36,7 @@ def godette(asset: Callable[[str], Path]) -> tuple[Path, Case]:
     return path, swaying(opened_path(path))
 
 
+@pytest.mark.slow
 def test_all_chains_agree_with_the_plain_loop(case: Case) -> None:
     motion = case.simulate()
     assert len(case.bones.nodes) == 41
@@ -57,6 +58,7 @@ def test_animated_scales_and_lengths_agree_with_the_plain_loop(case: Case) -> No
     assert chord(own.bones.nodes, own.simulate().rotations, list(own.bones.nodes), case.simulate().rotations) > 0.01
 
 
+@pytest.mark.slow
 def test_vrm_0_agrees_with_the_plain_loop(godette: tuple[Path, Case]) -> None:
     _, case = godette
     assert len(case.bones.nodes) == 16
