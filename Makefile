@@ -22,7 +22,7 @@ test: $(BIN)/.installed $(PAGE)
 	$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"; tests=$$?; \
 	  wait $$types && exit $$tests
 
-# What takes minutes: real files under three bounds, judged by three.js. CI runs it too.
+# What takes minutes: real files under three bounds, judged by three.js, kills. CI runs it too.
 slow: $(BIN)/.installed $(PAGE)
 	$(BIN)/python -m pytest -n auto -m slow
 
