@@ -13,10 +13,9 @@ from anim.measure.error.displacement import lengths_by_group, max_displacement
 from anim.measure.error.merged_groups import MergedGroups
 from anim.measure.error.metric import MAX_SEARCHED, Block, ErrorMetric
 from anim.measure.error.point_groups import PointGroups
-from anim.measure.error.sample_times import FPS, SAME_MOMENT, dense_times
+from anim.measure.error.sample_times import FPS, SAME_MOMENT, dense_times, grid_times
 from anim.measure.error.shell_points import ShellPoints
 from anim.model import Clip, Pose, Skeleton
-from anim.sampling.times import frame_times
 
 FRAMES = 64  # maximum number of times for mean and p99
 MAX_SAMPLES = 4_000_000  # maximum number of vertices × frames for mean and p99
@@ -99,7 +98,7 @@ def speed_error(
     It is an upper bound on that grid, at most 1 % above the true one. time: the middle of the frame's step.
     block: poses at other times too, if the caller has them: those of the grid are taken from it where it has them.
     """
-    times = frame_times(0.0, max(before.end, after.end), fps=fps)
+    times = grid_times(before, after, fps=fps)
     taken = None if block is None else _take_grid(block, times)
     worst = Peak()
     for block in ruler.blocks(before, after, times, player=player, overlap=1) if taken is None else [taken]:

@@ -23,7 +23,8 @@ from anim.sampling.world import local_matrices
 
 CUBIC_STEP = 1 / 60  # s; sample step of splines, with at least CUBIC_SEGMENTS samples per segment
 CUBIC_SEGMENTS = 8
-MAX_CUBIC_SEGMENTS = 256
+MAX_CUBIC_SEGMENTS = 256  # of one segment; at least a quarter where all would be more than MAX_CUBIC_GRID
+MAX_CUBIC_GRID = 16_384
 PROBE_FRAMES = 64  # maximum number of times at which moment arms are measured
 PATHS = ("translation", "rotation", "scale")
 ROTATION = PATHS.index("rotation")
@@ -143,7 +144,8 @@ def measurement_times(grid: Floats, tracks: Sequence[Track]) -> Floats:
 
 
 def _spline_times(axis: Floats) -> Floats:
-    pieces = np.clip(np.ceil(np.diff(axis) / CUBIC_STEP), CUBIC_SEGMENTS, MAX_CUBIC_SEGMENTS).astype(np.int64)
+    most = np.clip(MAX_CUBIC_GRID // max(len(axis) - 1, 1), MAX_CUBIC_SEGMENTS // 4, MAX_CUBIC_SEGMENTS)
+    pieces = np.clip(np.ceil(np.diff(axis) / CUBIC_STEP), CUBIC_SEGMENTS, most).astype(np.int64)
     inner = [np.linspace(a, b, n + 1) for a, b, n in zip(axis[:-1], axis[1:], pieces.tolist(), strict=True)]
     return np.concatenate(inner) if inner else axis
 
