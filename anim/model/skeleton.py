@@ -23,7 +23,8 @@ class Skeleton:
     names: (N,) as in the file, empty for a node without a name.
     parents: (N,) index of the parent, −1 for a root; acyclic.
     translation (N, 3) m, rotation (N, 4) unit xyzw, scale (N, 3): the rest pose, in the parent's space.
-    sheared: (X,) indices of nodes with a `matrix` that has no translation, rotation, scale; they can't be animated.
+    sheared: (X,) indices of nodes with a `matrix` that has no translation, rotation, scale (sheared, singular or
+    projective); they can't be animated.
     sheared_local: (X, 3, 4) local matrices of those.
     morphed: the nodes with morph targets, for pointers to their weights.
     Skeletons compare by identity.

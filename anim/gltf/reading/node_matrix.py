@@ -45,23 +45,31 @@ def expand_matrices(json: Json) -> tuple[Json, tuple[int, ...]]:
 
 
 def decompose(values: list[float]) -> tuple[Floats, Floats, Floats, Floats | None]:
-    """Return translation (3,), rotation (4,), scale (3,) of a `matrix`; and itself (3, 4) if sheared.
+    """Return translation (3,), rotation (4,), scale (3,) of a `matrix`; and itself (3, 4) if it isn't their product.
 
-    values: 16 numbers, column-major. Sheared: not a product of translation, rotation and scale within float32.
+    values: 16 numbers, column-major. Their product: within float32.
     """
-    whole = np.array(values, float).reshape(4, 4).T
+    whole = _matrix(values)
     translation, rotation, scale, shear = matrix.decompose(whole[:3])
-    is_sheared = bool(shear > MAX_RELATIVE_SHEAR) or bool(np.abs(whole[3] - (0, 0, 0, 1)).max() > MAX_RELATIVE_SHEAR)
-    return translation, rotation, scale, whole[:3] if is_sheared else None
+    is_product = bool(shear <= MAX_RELATIVE_SHEAR) and _is_affine(whole)
+    return translation, rotation, scale, None if is_product else whole[:3]
+
+
+def _matrix(values: list[float]) -> Floats:
+    return np.array(values, float).reshape(4, 4).T
+
+
+def _is_affine(whole: Floats) -> bool:
+    return bool(np.abs(whole[3] - (0, 0, 0, 1)).max() <= MAX_RELATIVE_SHEAR)
 
 
 def _expand(node: Json) -> Json:
     """The node with TRS instead of its matrix."""
-    translation, rotation, scale, sheared = decompose(node["matrix"])
-    if sheared is not None:
+    translation, rotation, scale, whole = decompose(node["matrix"])
+    if whole is not None:
+        kind, advice = _fault(_matrix(node["matrix"]))
         raise FormatError(
-            "is animated and has a sheared matrix (expected a product of translation, rotation and scale)",
-            help="remove the shear where the file was made: apply the scale of the nodes above this one, then export",
+            f"is animated and has a {kind} matrix (expected a product of translation, rotation and scale)", help=advice
         )
     rotation = -rotation if rotation[3] < 0 else rotation  # both are the same rotation; most tools write w ≥ 0
     pose = {key: _round_values(part) for key, part in zip(IDENTITY, (translation, rotation, scale), strict=True)}
@@ -70,6 +78,18 @@ def _expand(node: Json) -> Json:
     for key, value in node.items():
         new |= pose if key == "matrix" else {key: value}
     return new
+
+
+def _fault(whole: Floats) -> tuple[str, str]:
+    """The kind of a matrix (4, 4) without translation, rotation and scale, and advice."""
+    if _is_affine(whole):
+        return (
+            "sheared",
+            "remove the shear where the file was made: apply the scale of the nodes above this one, then export",
+        )
+    kind = "projective" if np.linalg.det(whole) else "singular"
+    row = ", ".join(f"{value:g}" for value in whole[3].tolist())
+    return kind, f"its last row is {row} (expected 0, 0, 0, 1): give the node a transform where the file was made"
 
 
 def _round_values(part: Floats) -> list[float]:

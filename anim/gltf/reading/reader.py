@@ -20,7 +20,7 @@ INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 def skeleton(document: Document) -> Skeleton:
-    """Return all nodes in their rest pose; a `matrix` is decomposed, or kept whole if sheared."""
+    """Return all nodes in their rest pose; a `matrix` is decomposed, or kept whole if it has none of these parts."""
     _check(document)
     return _skeleton(document, hierarchy.parents(document.json))
 

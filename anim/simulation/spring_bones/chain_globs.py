@@ -6,12 +6,12 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from anim.errors import NotFoundError, UnsupportedError
+from anim.errors import NotFoundError
 from anim.model import Skeleton
 from anim.operations.selection import match_names
 from anim.simulation.spring_bones.chains import SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import ORIGIN, Vector
-from anim.simulation.spring_bones.hierarchy import tail_at_rest
+from anim.simulation.spring_bones.hierarchy import check_rotatable, tail_at_rest
 
 
 def find_chains(
@@ -81,8 +81,7 @@ def _joints(
     waiting = [root]
     while waiting:
         node = waiting.pop()
-        if node in skeleton.sheared:
-            raise UnsupportedError(f"{skeleton.label(node)} has a sheared matrix, which no rotation can animate")
+        check_rotatable(skeleton, node)
         every = children.get(node, [])
         next_joints = [child for child in every if allowed is None or child in allowed]
         away = [child for child in (next_joints or every) if skeleton.translation[child].any()]

@@ -22,7 +22,7 @@ def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
 
     Every node exists; a joint belongs to one chain, and its tail is one of its descendants; a center is the first joint
     or an ancestor of it; a collider is not moved by a joint that collides with it. Raises FormatError otherwise, and
-    UnsupportedError for a joint with a sheared matrix, which no rotation can animate.
+    UnsupportedError for a joint that `check_rotatable` refuses.
     """
     owners: dict[int, int] = {}
     for i, collider in enumerate(bones.colliders):
@@ -60,10 +60,17 @@ def _check_chain(skeleton: Skeleton, bones: SpringBones, chain: SpringChain) -> 
             )
 
 
+def check_rotatable(skeleton: Skeleton, node: int) -> None:
+    """Raise UnsupportedError for a node with a matrix that has no translation, rotation and scale."""
+    if node in skeleton.sheared:
+        raise UnsupportedError(
+            f"{skeleton.label(node)} has a sheared or singular matrix, which no rotation can animate"
+        )
+
+
 def _check_joint(skeleton: Skeleton, joint: SpringJoint) -> None:
     _check_node(skeleton, joint.node, "joint")
-    if joint.node in skeleton.sheared:
-        raise UnsupportedError(f"{skeleton.label(joint.node)} has a sheared matrix, which no rotation can animate")
+    check_rotatable(skeleton, joint.node)
     if joint.tail is None:
         return
     _check_node(skeleton, joint.tail, "joint")

@@ -98,11 +98,14 @@ def test_a_shear_is_refused_with_advice() -> None:
     assert "export" in caught.value.help
 
 
-def test_a_bottom_row_is_part_of_it() -> None:
-    whole = composed([1, 1, 1])
-    whole[3, 0] = 0.1
-    with pytest.raises(FormatError, match="sheared"):
+@pytest.mark.parametrize(
+    ("whole", "kind", "row"),
+    [(np.zeros((4, 4)), "singular", "0, 0, 0, 0"), (np.eye(4) * 2, "projective", "0, 0, 0, 2")],
+)
+def test_a_last_row_that_is_not_0_0_0_1_is_named(whole: Floats, kind: str, row: str) -> None:
+    with pytest.raises(FormatError, match=f"node 0 'hip': is animated and has a {kind} matrix") as caught:
         document_with(whole)
+    assert caught.value.help.startswith(f"its last row is {row} (expected 0, 0, 0, 1)")
 
 
 def test_what_is_the_identity_is_left_out() -> None:
