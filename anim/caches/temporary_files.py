@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import math
 import os
@@ -27,11 +28,19 @@ def temp_output(
         path = Path(folder) / f"output{ending}"
         try:
             yield str(path)
-        except failures:  # their words hide the reason, or spread it over many lines
-            help = f"is there room for temporary files in {tempfile.gettempdir()}? TMPDIR names another folder"
-            raise OutputError(f"{name}: can't be written as {ending} in a temporary file", help=help) from None
+        except failures as failure:
+            why = _system_reason(str(failure)) or "is there room?"
+            where = f"as {ending} in a temporary file in {tempfile.gettempdir()}"
+            help = "TMPDIR names another folder for temporary files"
+            raise OutputError(f"{name}: can't be written {where} ({why})", help=help) from None
         with path.open("rb") as source, outputs.create(name) as target:
             shutil.copyfileobj(source, target, COPY_BYTES)
+
+
+def _system_reason(words: str) -> str:
+    """The system's reason among the words of a package, which are on many lines and name its own sources; or ""."""
+    reasons = (os.strerror(number) for number in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EROFS))
+    return next((reason.lower() for reason in reasons if reason in words), "")
 
 
 def check_free_space(size: int, name: str) -> None:
