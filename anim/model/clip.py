@@ -60,6 +60,12 @@ class Clip:
         """Time of the last key, in seconds: the animation's duration in glTF, where it always starts at 0."""
         return max((float(axis.times[-1]) for axis in self.time_axes), default=0.0)
 
+    @property
+    def num_bytes(self) -> int:
+        """Bytes of the values and tangents of all tracks, as in memory."""
+        arrays = (each for track in self.tracks for each in (track.values, track.in_tangents, track.out_tangents))
+        return sum(each.nbytes for each in arrays if each is not None)
+
     def __repr__(self) -> str:
         return f"Clip({self.name!r}, tracks={len(self.tracks)}, start_s={self.start:.6g}, end_s={self.end:.6g})"
 

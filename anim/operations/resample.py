@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from anim.sampling.batch import Batch, batches
 from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"
-BYTES_PER_VALUE = 4 * 8  # float64, and arrays of intermediate results
+BYTES_PER_VALUE = 8 * 8  # float64, arrays of intermediate results, and the file
 UNIT_TOLERANCE = 1e-6  # of a squared length: error by rounding to float32
 INTERPOLATIONS = (KEEP, "step", "linear", "cubicspline")
 
@@ -44,7 +45,7 @@ def resample(
     axis = TimeAxis(key_times(frame_times(clip.start, clip.end, fps=fps)))
     goals = {i: _goal(clip.tracks[i], interpolation) for i in sorted(chosen) if _is_sampled(clip.tracks[i])}
     goals = {i: goal for i, goal in goals.items() if snap or not _holds(clip.tracks[i], goal)}
-    _check_size(clip, list(goals), len(axis))
+    _check_size(clip, goals, len(axis))
     values = _sample_tracks([clip.tracks[i] for i in goals], axis.times)
     new = [_keep_keys(t, _goal(t, interpolation)) if i in chosen else t for i, t in enumerate(clip.tracks)]
     for (i, goal), sampled in zip(goals.items(), values, strict=True):
@@ -52,10 +53,11 @@ def resample(
     return Clip(clip.name, tuple(new))
 
 
-def _check_size(clip: Clip, tracks: list[int], keys: int) -> None:
+def _check_size(clip: Clip, goals: Mapping[int, Interpolation], keys: int) -> None:
     """Raise UnsupportedError for more values than the limit of memory allows, before any is computed."""
-    budget = MemoryBudget(sum(track.values.nbytes for track in clip.tracks))
-    budget.add(BYTES_PER_VALUE * keys * sum(clip.tracks[i].values.shape[1] for i in tracks))
+    budget = MemoryBudget(clip.num_bytes)
+    parts = {goal: 3 if goal is Interpolation.CUBICSPLINE else 1 for goal in Interpolation}  # with tangents
+    budget.add(BYTES_PER_VALUE * keys * sum(parts[goal] * clip.tracks[i].values.shape[1] for i, goal in goals.items()))
 
 
 def _goal(track: Track, interpolation: str) -> Interpolation:

@@ -10,8 +10,8 @@ import typer
 
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
+from anim.measure.error.sample_times import grid_times
 from anim.operations.selection import Selection
-from anim.sampling.times import frame_times
 from anim.show.plots.collapse_plot import collapse_plot
 from anim.skinning.analysis.collapse import Comparison
 from anim.skinning.analysis.recommendations import CollapseFinding
@@ -38,7 +38,10 @@ def command(
     bulge_clamp: Annotated[
         bool, typer.Option("--bulge-clamp", help="Apply the bulge clamp of bake to methods other than lbs.")
     ] = False,
-    fps: Annotated[float, typer.Option("--samples-per-second", metavar="N", help="Samples per second of a clip.")] = 30,
+    fps: Annotated[
+        float,
+        typer.Option("--samples-per-second", metavar="N", help="Samples per second; of clips of many minutes fewer."),
+    ] = 30,
     clip: common.Clips = None,
     mesh: meshes.Meshes = None,
     format: common.Report = Format.TEXT,
@@ -75,7 +78,7 @@ def command(
         comparison = Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=meshes.nodes(scene, mesh))
         progress = Progress("collapse", len(numbers), shown=not quiet)
         for done, i in enumerate(numbers):
-            times = frame_times(clips[i].start, clips[i].end, fps=fps)
+            times = grid_times(clips[i], fps=fps, start=clips[i].start)
             found += [
                 CollapseFinding(i, reader.clip_name(clips[i].name, i), each)
                 for each in comparison.of(clips[i], times=times)

@@ -22,6 +22,7 @@ from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.measure.equal_clips import first_equal, repeat_change
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.inspect.track_statistics import non_unit_keys
+from anim.memory import MemoryBudget
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection
 from anim.units import format_number, plural
@@ -35,6 +36,7 @@ Clips = Mapping[int, Clip]  # by index in the file
 Tracks = Callable[[Clip], frozenset[int]]  # indices of a clip's selected tracks
 Change = Callable[[Clip, frozenset[int], Callable[[], Scene]], Clip]
 ChangeMany = Callable[[Clips, Tracks, Callable[[], Scene]], Clips]
+BYTES_PER_BYTE = 8  # of memory for one of a changed clip's values: written, read back and measured
 MAX_LISTED_CLIPS = 3  # clips listed with their durations; of more the sum
 
 
@@ -78,12 +80,14 @@ def _change_each(
 ) -> Clips:
     numbers = list(clips)
     new: dict[int, Clip] = {}
+    budget = MemoryBudget(sum(clip.num_bytes for clip in clips.values()))
     for i, n in zip(numbers, first_equal([(clip,) for clip in clips.values()]), strict=True):
         if numbers[n] in new:
             new[i] = repeat_change(clips[i], clips[numbers[n]], new[numbers[n]])
             continue
         try:
             new[i] = change(clips[i], tracks(clips[i]), scene)
+            budget.add(BYTES_PER_BYTE * new[i].num_bytes)
         except AnimError as error:
             raise error.at(reader.clip_label(clips[i].name, i)).advise(advise(clips[i], i)) from None
     return new

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ from anim.exchange.euler.curve import Curve, Mode, uniform_modes
 from anim.exchange.euler.frame_error import frame_error
 from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
 from anim.exchange.euler.rotation_order import OrderRules
-from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD
+from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD, check_curve_memory
 from anim.exchange.formats.labels import label_of, labels, skipped_note, unique
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
@@ -156,6 +157,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     if fps is not None:
         check_fps(fps)
         frames = check_duration(start, end, fps=fps)
+        check_curve_memory(clip, math.ceil(frames))
         shown = np.arange(int(np.ceil(frames - GRID_TOLERANCE_FRAMES)) + 1) / fps
     else:
         step = (end - start) / max(len(keys) - 1, 1)

@@ -17,6 +17,7 @@ from anim.exchange.euler.rotation_order import OrderRules
 from anim.exchange.formats.labels import label_of, labels, skipped_note
 from anim.maths import euler, quaternion
 from anim.maths.euler import AxesConvention
+from anim.memory import MemoryBudget
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling import frame_times
 from anim.sampling.batch import batches
@@ -27,6 +28,7 @@ LOCK_TOLERANCE_RAD = 1e-6  # rad; uncertainty of a lock in a file's float32 quat
 ERROR_FRACTIONS = np.array((0.25, 0.5, 0.75))
 MODES = {"STEP": Mode.STEP, "LINEAR": Mode.LINEAR, "CUBICSPLINE": Mode.CUBIC}
 MAX_ROUNDS, MAX_KEYS = 24, 500_000
+BYTES_PER_VALUE = 160  # of a curve, and of its text as JSON
 BLOCK_KEYS = 1 << 14  # keys of nodes converted together
 
 
@@ -64,6 +66,7 @@ def to_euler(
     if tolerance is not None and not 1e-6 <= tolerance < np.inf:
         raise RangeError(f"`tolerance` is {tolerance:g} rad (expected 1e-06 or more)")
     frames = key_times(frame_times(clip.start, clip.end, fps=fps)) if fps is not None else None
+    check_curve_memory(clip, 0 if frames is None else len(frames))
     names = labels(skeleton)
     orders.check(names)
     by_node, lost = _by_node(clip, names)
@@ -92,6 +95,11 @@ def to_euler(
         for number in kept
     )
     return EulerCurves(EulerMotion(nodes, notes=skipped_note(lost)), deviation)
+
+
+def check_curve_memory(clip: Clip, frames: int) -> None:
+    """Raise UnsupportedError if the curves of a clip with so many frames take more than the limit of memory."""
+    MemoryBudget(clip.num_bytes).check(BYTES_PER_VALUE * 3 * len(clip.tracks) * frames)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,11 +18,13 @@ from anim.exchange.usd_skel.sample_times import frame_rate, sample_times
 from anim.exchange.usd_skel.stage import StageBuilder, StageTimes
 from anim.files.signals import hold_signals
 from anim.gltf.document import Document
+from anim.memory import MemoryBudget
 from anim.model import Clip, Scene
-from anim.sampling.times import check_fps
+from anim.sampling.times import check_duration, check_fps
 from anim.sampling.weight_pointers import resolve_weight_pointers
 
 USD_FORMATS = (".usdz", ".usdc", ".usda")
+BYTES_PER_POSE = 400  # of one node: sampled, written and read back
 DEFAULT_FPS = 60.0  # of clips whose keys are on the frames of no common rate
 
 
@@ -56,6 +58,8 @@ def write(
         raise NotFoundError("there is no mesh with faces to write", help="USD has no use for a file without meshes")
     own_rate = frame_rate(clip) if fps is None else fps
     rate = own_rate or DEFAULT_FPS
+    frames = check_duration(clip.start, clip.end, fps=rate)
+    MemoryBudget(clip.num_bytes).check(round(BYTES_PER_POSE * len(scene.skeleton) * frames))
     times = StageTimes(sample_times(clip, rate, with_keys=own_rate is None), rate)
     notes = dict.fromkeys(_left_out(document, scene, clip))
 

@@ -14,7 +14,7 @@ from anim.sampling.times import check_duration, check_fps, frame_times
 
 SAME_MOMENT = 1e-6  # s; closer times are equal, written as float32 and as float64
 FPS = 120.0  # fps of the grid for motion between keys
-MAX_SPARSE_TIMES = 65_536  # 9 minutes of the grid; longer clips with few keys have fewer times between two keys
+MAX_SPARSE_TIMES = 8192  # a minute of the grid; longer clips with few keys have fewer times between two keys
 MIN_TIMES_PER_INTERVAL = 32  # between two keys of such clips
 
 

@@ -40,9 +40,9 @@ def test_pairs_of_the_grid_are_neighboring_frames_of_it() -> None:
 
 
 @pytest.mark.parametrize("keys", [2, 300])
-def test_clips_of_minutes_have_all_frames(keys: int) -> None:
-    short = clip(track("translation", np.linspace(0, 500, keys), np.zeros((keys, 3))))
-    np.testing.assert_array_equal(grid_times(short), frame_times(0, 500, fps=120.0))
+def test_clips_of_a_minute_have_all_frames(keys: int) -> None:
+    short = clip(track("translation", np.linspace(0, 60, keys), np.zeros((keys, 3))))
+    np.testing.assert_array_equal(grid_times(short), frame_times(0, 60, fps=120.0))
 
 
 def test_speeds_of_long_clips_are_those_of_the_whole_grid() -> None:
