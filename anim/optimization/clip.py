@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,10 +13,9 @@ from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track, parse_weig
 from anim.model.track import share_time_axes
 from anim.optimization.options import Drop
 from anim.optimization.search.context import Context
+from anim.optimization.search.lockstep import Found, SearchRequest
 from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
-from anim.optimization.search.search import search
-from anim.optimization.search.source_motion import PATHS, SourceMotion, analyze_source, key_grid
-from anim.optimization.search.trial import CHORD_BOUND_FRACTION, BoundUsage, TrialRunner
+from anim.optimization.search.source_motion import PATHS, SourceMotion, key_grid
 from anim.optimization.tracks import clip_ends, key_reduction, morph_weights, quantization
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
@@ -33,6 +33,7 @@ class Task:
     shared: per track, constants that other clips use for the same property, the most frequent first.
     unused: (tracks of the clip) whether every clip keeps the property at its rest value. bound: m, for the search.
     at_rest: (tracks of the clip) whether it stays so close to its rest value that no search is needed; empty: unknown.
+    extra: points to measure beside the usual ones, (index of the surface, index of the vertex).
     """
 
     clip: Clip
@@ -40,18 +41,24 @@ class Task:
     unused: tuple[bool, ...]
     bound: float
     at_rest: tuple[bool, ...] = ()
+    extra: frozenset[tuple[int, int]] = frozenset()
 
 
-def solve(context: Context, task: Task) -> Solution | None:
-    """Return the smallest solution within the bounds that the effort finds; None if there is none.
+Solving: TypeAlias = Generator[SearchRequest, Found | None, Solution | None]
+
+
+def solve(context: Context, task: Task) -> Solving:
+    """Yield the searches of a clip, of which it takes the results; return the smallest solution within the bounds.
+
+    None if there is none.
 
     Lines that replace splines are compared track by track, and all of them together: on one time axis each of them can
     be smaller than its spline where all splines would need no such axis.
     """
-    found = _TrackSorter(context, task).solution()
+    found = yield from _TrackSorter(context, task).solution()
     if found is None or _splines(found.clip) == _splines(task.clip):
         return found
-    other = _TrackSorter(context, task, keep_splines=True).solution()
+    other = yield from _TrackSorter(context, task, keep_splines=True).solution()
     return found if other is None else min(found, other, key=lambda each: each.size(context.coding))
 
 
@@ -79,15 +86,15 @@ class _TrackSorter:
             self._sort(i, track)
         self._reduce_weights()
 
-    def solution(self) -> Solution | None:
-        found = self._search(self._free)
+    def solution(self) -> Solving:
+        found = yield from self._search(self._free)
         splines = [i for i in self._free if self._clip.tracks[i].interpolation is Interpolation.CUBICSPLINE]
         if found is not None:
             splines = [i for i in splines if i in found and self._spline_is_smaller(i, found[i][0], found)]
         if splines:  # smaller than lines, or possibly too curved for lines within the bound
             for i in splines:
                 self._keep_exactly(i)
-            others = self._search([i for i in self._free if i not in splines])
+            others = yield from self._search([i for i in self._free if i not in splines])
             found = found if others is None else others
         if found is None:
             return None
@@ -203,32 +210,22 @@ class _TrackSorter:
         axis = self._context.coding.byte_costs.axis + 4 * len(track.times)
         return value_bytes(track) + axis / sharing
 
-    def _search(self, free: Sequence[int]) -> dict[int, tuple[Track, EncodedKeys]] | None:
+    def _search(
+        self, free: Sequence[int]
+    ) -> Generator[SearchRequest, Found | None, dict[int, tuple[Track, EncodedKeys]] | None]:
         """Search the free tracks; None without a solution. Tracks that the search drops are absent."""
-        context = self._context
         if not free:
             return {}
-        bound = self._task.bound
-        found = analyze_source(
-            context.skeleton,
+        found = yield SearchRequest(
             self._clip,
-            free,
-            context.points,
-            context.answering,
-            reference=context.policy.reference,
-            chord_tolerance=CHORD_BOUND_FRACTION * bound,
-        )
-        allowed = np.full(len(context.points), bound - self._spent)
-        runner = TrialRunner(
-            context.skeleton,
-            found,
-            BoundUsage(context.skeleton, found, allowed, replace(context.bounds, max_error=bound)),
-            context.coding,
+            tuple(free),
+            self._task.bound,
+            self._spent,
             np.array([self._is_droppable(i) for i in free], np.bool_),
-            [self._task.shared[i] for i in free],
+            tuple(self._task.shared[i] for i in free),
+            self._task.extra,
         )
-        outcome = search(runner, bound, context.effort)
-        return None if outcome is None else _tracks(self._clip, found, outcome)
+        return None if found is None else _tracks(self._clip, found.source, found.result)
 
 
 def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, tuple[Track, EncodedKeys]]:

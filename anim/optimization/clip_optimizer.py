@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeAlias, TypeVar
 
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric, MotionError
@@ -12,6 +14,7 @@ from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Effort, Request
 from anim.optimization.search.context import Context, build_context
+from anim.optimization.search.lockstep import Found, SearchRequest, search_clips
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
@@ -23,6 +26,10 @@ NEW_VERTEX_RETRY_FACTOR = 0.995  # the same if the worst vertex was not among th
 MAX_REDUCED_KEY_FRACTION = 0.5  # of the source's keys; below it the lossless version cannot be smaller
 MAX_ROUNDS = 6  # of search and verification; a clip that fails the last one is stored losslessly
 UNVERIFIED = Verification(MotionError(0.0, 0.0, "", "", 0), "", None, 0.0)
+
+
+Result = TypeVar("Result")
+Optimizing: TypeAlias = Generator[tuple[Effort, SearchRequest], "Found | None", Result]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,31 +125,71 @@ class ClipOptimizer:
         return Prover(self._ruler)
 
 
-def optimize_clip(optimizer: ClipOptimizer, item: tuple[int, Task]) -> ClipResult:
-    """Return clip `item[0]` in the fewest bytes found within all bounds, verified as stored.
+def optimize_clips(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) -> list[ClipResult]:
+    """Return each clip `item[0]` in the fewest bytes found within all bounds, verified as stored.
 
-    The lossless version competes too: a few splines or steps can be smaller than the lines that replace them.
+    All are searched and verified side by side. The lossless version competes too: a few splines or steps can be smaller
+    than the lines that replace them.
     """
-    number, task = item
+    steps = [_optimize(optimizer, number, task) for number, task in items]
+    found: dict[int, ClipResult] = {}
+    answers: dict[int, Any] = dict.fromkeys(range(len(steps)))
+    while answers:
+        asked: dict[int, tuple[Effort, SearchRequest]] = {}
+        for n, answer in answers.items():
+            try:
+                asked[n] = steps[n].send(answer)
+            except StopIteration as end:
+                found[n] = end.value
+        answers = _search(optimizer, asked)
+    return [found[n] for n in range(len(steps))]
+
+
+def _search(optimizer: ClipOptimizer, asked: Mapping[int, tuple[Effort, SearchRequest]]) -> dict[int, Found | None]:
+    """The result of each search; those with equal efforts run side by side, on the points that any of them needs."""
+    answers: dict[int, Found | None] = {}
+    for effort in dict.fromkeys(effort for effort, _ in asked.values()):
+        some = {n: request for n, (one, request) in asked.items() if one == effort}
+        extra = frozenset().union(*(request.extra for request in some.values()))
+        answers.update(zip(some, search_clips(optimizer.context(extra), list(some.values()), effort), strict=True))
+    return answers
+
+
+def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[ClipResult]:
+    """Optimize one clip: yields its searches, of which it takes the results."""
     context = optimizer.context()
-    found = [
-        each
-        for effort in context.effort.all()
-        if (each := _search_within_bounds(optimizer, number, task, effort)) is not None
-    ]
+    found = []
+    for effort in context.effort.all():
+        each = yield from _search_within_bounds(optimizer, number, task, effort)
+        if each is not None:
+            found.append(each)
     best = min(found, key=lambda each: each.solution.size(context.coding), default=None)
     is_exact = context.bounds.max_error == 0
     if best is not None and (is_exact or _keys(best.solution.clip) < MAX_REDUCED_KEY_FRACTION * _keys(task.clip)):
         return best
     if best is not None and best.solution.size(context.coding) <= _min_lossless_bytes(context, task.clip):
         return best
-    exact = solve(replace(context, bounds=replace(context.bounds, max_error=0.0)), task)
+    lossless = replace(context, bounds=replace(context.bounds, max_error=0.0))
+    exact = yield from _solve(lossless, task, context.effort)
     assert exact is not None
     if best is not None and best.solution.size(context.coding) <= exact.size(context.coding):
         return best
     if best is None and not is_exact:
         return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=True)
     return _verify(optimizer, number, exact)
+
+
+def _solve(context: Context, task: Task, effort: Effort) -> Optimizing[Solution | None]:
+    """The solution of a clip, whose searches are yielded with their effort."""
+    steps = solve(context, task)
+    answer: Found | None = None
+    while True:
+        try:
+            request = steps.send(answer)
+        except StopIteration as end:
+            solution: Solution | None = end.value
+            return solution
+        answer = yield effort, request
 
 
 def _min_lossless_bytes(context: Context, clip: Clip) -> float:
@@ -164,14 +211,15 @@ def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
 
 
-def _search_within_bounds(optimizer: ClipOptimizer, number: int, task: Task, effort: Effort) -> ClipResult | None:
+def _search_within_bounds(
+    optimizer: ClipOptimizer, number: int, task: Task, effort: Effort
+) -> Optimizing[ClipResult | None]:
     """Search until a solution passes verification; None if none does.
 
     After each failure the vertex with the largest error becomes a measured point, and the bound is reduced.
     """
-    extra: frozenset[tuple[int, int]] = frozenset()
     for _ in range(MAX_ROUNDS):
-        solution = solve(replace(optimizer.context(extra), effort=effort), task)
+        solution = yield from _solve(optimizer.context(), task, effort)
         if solution is None:
             return None
         result = _verify(optimizer, number, solution)
@@ -179,7 +227,6 @@ def _search_within_bounds(optimizer: ClipOptimizer, number: int, task: Task, eff
         if found.holds:
             return result
         worst = optimizer.worst_vertex(found)
-        factor = NEW_VERTEX_RETRY_FACTOR if worst - extra else min(RETRY_FACTOR / found.usage, RETRY_FACTOR)
-        extra |= worst
-        task = replace(task, bound=task.bound * factor)
+        factor = NEW_VERTEX_RETRY_FACTOR if worst - task.extra else min(RETRY_FACTOR / found.usage, RETRY_FACTOR)
+        task = replace(task, bound=task.bound * factor, extra=task.extra | worst)
     return None

@@ -14,7 +14,7 @@ from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimization import writing
 from anim.optimization.clip import Task
-from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clip
+from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
@@ -26,6 +26,7 @@ from anim.optimization.writing import changed_clips, write_solutions
 from anim.sampling.times import check_duration
 
 SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
+BATCH_KEYS = 300  # of the longest tracks of clips that are optimized side by side, in all
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +89,11 @@ def optimize(
         return reader.clip_label(clips[item[0]].name, item[0])
 
     found: dict[int, ClipResult] = {}
-    with process_pool(min(workers, len(distinct)), optimizer, start=start) as pool:
-        results = pool.each(optimize_clip, distinct, label=name, work=lambda item: _work(item[1].clip))
-        for (number, _), each in zip(distinct, results, strict=True):
-            found[number] = each
+    batches = _batches(distinct)
+    with process_pool(min(workers, len(batches)), optimizer, start=start) as pool:
+        results = pool.each(optimize_clips, batches, label=lambda batch: name(batch[0]), work=_work)
+        for batch, some in zip(batches, results, strict=True):
+            found.update(zip((number for number, _ in batch), some, strict=True))
             progress(len(found) / len(distinct))
     found = {number: found[tasks[first[n]][0]] for n, (number, _) in enumerate(tasks)}
     solutions = {number: each.solution.named(clips[number].name) for number, each in found.items()}
@@ -114,9 +116,31 @@ def _first_equal(tasks: Sequence[tuple[int, Task]]) -> list[int]:
     ]
 
 
-def _work(clip: Clip) -> float:
-    """Estimate of the work on a clip: the number of its values."""
-    return float(sum(track.values.size for track in clip.tracks))
+def _batches(tasks: Sequence[tuple[int, Task]]) -> list[list[tuple[int, Task]]]:
+    """The tasks in batches that are optimized side by side, of clips with about as many keys, the longest first.
+
+    They depend on the clips alone, and not on the number of processes, so that the result does not either.
+    """
+    batches: list[list[tuple[int, Task]]] = []
+    room = 0
+    for task in sorted(tasks, key=lambda task: (-_length(task[1].clip), task[0])):
+        length = _length(task[1].clip)
+        if not batches or room < length:
+            batches.append([])
+            room = BATCH_KEYS
+        batches[-1].append(task)
+        room -= length
+    return batches
+
+
+def _length(clip: Clip) -> int:
+    """The number of keys of a clip's longest track."""
+    return max((len(track.times) for track in clip.tracks), default=0)
+
+
+def _work(batch: Sequence[tuple[int, Task]]) -> float:
+    """Estimate of the work on a batch: the number of its values."""
+    return float(sum(track.values.size for _, task in batch for track in task.clip.tracks))
 
 
 def _visible_clips(request: Request, scene: Scene) -> Request:

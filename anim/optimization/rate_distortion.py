@@ -13,6 +13,7 @@ MIN_BOUND_PER_DIAGONAL, MAX_BOUND_PER_DIAGONAL = 1e-6, 0.1  # range of the searc
 TABLE_FRACTIONS = tuple(10.0 ** (k / 4 - 6) for k in range(21))  # of the diagonal: that range, four a decade
 TABLE_FACTOR = TABLE_FRACTIONS[1] / TABLE_FRACTIONS[0]
 FIRST_ENTRY, FIRST_STEP = 12, 4  # of the table: 1e-3 of the diagonal, and its neighbors a decade apart
+FIRST_FRACTION = TABLE_FRACTIONS[FIRST_ENTRY]
 SIZE_MARGIN = 3e-3  # of the animation's bytes: sizes between two entries are estimates
 BOUND_STEP_FACTOR = 1.05  # between the bounds that a search may return
 BOUND_EXPONENT_PER_SIZE = 16.0  # a bound 17 % larger saves about a percent of the animation's bytes

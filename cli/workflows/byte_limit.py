@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import (
+    FIRST_FRACTION,
     MAX_BOUND_PER_DIAGONAL,
     RatePoint,
     bound_below,
@@ -23,7 +24,9 @@ from cli.workflows.optimize_job import OptimizeJob, with_bound
 
 FAST = "fast"  # effort of sizes that are tried
 USUAL_RATIO = 0.985  # bytes of animation after a longer search, as a fraction of those after a fast one
-SAMPLED_CLIPS = 4  # one clip of so many measures that ratio
+RATIO_CLIPS = 8  # one clip of so many measures that ratio
+SIZE_CLIPS = 3  # one clip of so many measures sizes at other bounds than the first
+MIN_SIZE_CLIPS = 12  # of a file; of fewer all are measured
 MAX_FULL_SEARCHES = 4  # until a result fits; the last one at the largest bound
 MAX_UNUSED_FRACTION = 0.015  # of the animation's bytes; more are worth another search
 MAX_REFINEMENTS = 3
@@ -103,28 +106,47 @@ class ByteLimit:
         return result.point.size <= self._max_bytes
 
     def _estimate(self, request: Request, max_error: float) -> RatePoint:
-        """The size at a bound, in m, by a fast search without verification."""
+        """The size at a bound, in m, by a fast search without verification.
+
+        Of files with many clips all are searched at one bound, and some at the others: sizes are in proportion.
+        """
+        usual = FIRST_FRACTION * self._job.scale
+        if max_error in (0.0, usual) or len(self._job.chosen) < MIN_SIZE_CLIPS:
+            return self._whole(request, max_error)[0]
+        point, sizes = self._whole(request, usual)
+        chosen = _sample(self._job, sizes, SIZE_CLIPS)
+        total = sum(sizes[i] for i in chosen)
+        if not total:
+            return self._whole(request, max_error)[0]
+        animation = round(point.animation * self._fast_bytes(request, max_error, chosen) / total)
+        return RatePoint(max_error, point.size - point.animation + animation, point.error, animation)
+
+    def _whole(self, request: Request, max_error: float) -> tuple[RatePoint, Mapping[int, float]]:
+        """The size at a bound by a fast search of all clips, and the bytes of each."""
         if max_error not in self._tried:
             found = self._job.run(replace(with_bound(request, max_error), effort=FAST), verified=False)
             self._tried[max_error] = self._job.point(max_error, found), found.sizes(request)
-        return self._tried[max_error][0]
+        return self._tried[max_error]
+
+    def _fast_bytes(self, request: Request, max_error: float, clips: Sequence[int]) -> float:
+        """Bytes of some clips after a fast search."""
+        if max_error in self._tried:
+            sizes = self._tried[max_error][1]
+        else:
+            quick = replace(with_bound(request, max_error), effort=FAST)
+            sizes = self._job.run(quick, chosen=clips, verified=False).sizes(request)
+        return sum(sizes[i] for i in clips)
 
     def _ratio(self, request: Request, max_error: float) -> float:
         """Bytes of the search's effort as a fraction of a fast one's, by some of the clips."""
         if request.effort == FAST:
             return 1.0
-        self._estimate(request, max_error)
-        _, fast = self._tried[max_error]
-        if not fast:
+        _, sizes = self._whole(request, FIRST_FRACTION * self._job.scale)
+        chosen = _sample(self._job, sizes, RATIO_CLIPS)
+        if not chosen:
             return 1.0
-        chosen = self._sample(fast)
         full = self._job.run(with_bound(request, max_error), chosen=chosen, verified=False).sizes(request)
-        return sum(full.values()) / max(sum(fast[i] for i in chosen), 1.0)
-
-    def _sample(self, clips: Iterable[int]) -> list[int]:
-        """Some of the clips, large ones and small ones."""
-        sizes = {i: sum(track.values.size for track in self._job.clips[i].tracks) for i in clips}
-        return sorted(sorted(sizes, key=lambda i: -sizes[i])[::SAMPLED_CLIPS])
+        return sum(full.values()) / max(self._fast_bytes(request, max_error, chosen), 1.0)
 
     def _refusal(self, points: Iterable[RatePoint], most: float) -> CheckError:
         """The error for a limit that none of the points meets. most: m, the largest bound."""
@@ -138,3 +160,9 @@ class ByteLimit:
             f"{kept}{'; ' if kept else ''}nothing was written",
             help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {least.size}",
         )
+
+
+def _sample(job: OptimizeJob, clips: Iterable[int], count: int) -> list[int]:
+    """One clip of `count`: large ones and small ones."""
+    sizes = {i: sum(track.values.size for track in job.clips[i].tracks) for i in clips}
+    return sorted(sorted(sizes, key=lambda i: -sizes[i])[::count])

@@ -25,6 +25,8 @@ CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in
 ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
 DENSE = 4_000_000  # values; a larger matrix is stored as a sparse one
 BLOCK = 500_000  # values per step of a product
+BLOCK_ROWS = 64  # of a dense matrix, in blocks
+MAX_USED_FRACTION = 0.7  # of its columns, in a block for which they are copied
 NODE_BLOCK = 8192  # nodes whose matrices are stacked at once
 
 
@@ -72,6 +74,13 @@ class PointMatrix:
     def take(self, chosen: Ints) -> PointMatrix:
         """Return some of the points, by index."""
         return PointMatrix(self.nodes, self.joints[chosen], self.factors[chosen])
+
+    def by_joint(self) -> PointMatrix:
+        """Return the points in the order of the joints with their largest weights."""
+        if not len(self):
+            return self
+        most = self.factors[..., 3].argmax(axis=1)
+        return self.take(np.argsort(self.joints[np.arange(len(self)), most], kind="stable"))
 
     def rebind(self, bindings: Ints, offsets: Floats) -> PointMatrix:
         """Return the same points on other nodes: `bindings[n]` (N,) instead of n.
@@ -133,6 +142,16 @@ class PointRows:
 
     def __init__(self, matrix: Any) -> None:
         self._matrix = matrix
+        self._blocks = list(_dense_blocks(matrix)) if isinstance(matrix, np.ndarray) else []
+
+    def blocks(self, columns: NDArray[Any]) -> Iterator[tuple[slice, Floats]]:
+        """Yield displacements as `moves` does, in blocks of rows: points in the order of joints need few columns."""
+        if not self._blocks:
+            yield slice(None), self.moves(columns)
+            return
+        columns = columns.astype(np.float32, copy=False)
+        for rows, used, matrix in self._blocks:
+            yield rows, _moves(matrix, columns if used is None else columns[used])
 
     def moves(self, columns: NDArray[Any]) -> Floats:
         """Return displacements (P, 3, F) in float32 from differences of `stacked` matrices (4 J, 3 F)."""
@@ -147,6 +166,19 @@ class PointRows:
             moves *= moves
             found.append(moves.sum(axis=1))
         return np.concatenate(found)
+
+
+def _dense_blocks(
+    matrix: NDArray[np.float32],
+) -> Iterator[tuple[slice, Ints | None, NDArray[np.float32]]]:
+    """Rows of a dense matrix in blocks: their place, the columns that are not 0 (None: all), and these entries."""
+    for first in range(0, len(matrix), BLOCK_ROWS):
+        rows = slice(first, first + BLOCK_ROWS)
+        used = np.flatnonzero(matrix[rows].any(axis=0))
+        if len(used) > MAX_USED_FRACTION * matrix.shape[1]:
+            yield rows, None, matrix[rows]
+        else:
+            yield rows, used, np.ascontiguousarray(matrix[rows][:, used])
 
 
 def _moves(matrix: Any, columns: NDArray[np.float32]) -> Floats:

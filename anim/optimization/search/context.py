@@ -95,7 +95,7 @@ def build_context(
     if policy.drop_invisible:
         shells = {node for node in shells if node in policy.keep}
     world = rest_world(skeleton)
-    points = points_.sample_points(scene, shells, bounds.shell, extra)
+    points = points_.sample_points(scene, shells, bounds.shell, extra).by_joint()
     places = points.places(world[:, None])[:, 0]
     return Context(
         skeleton,

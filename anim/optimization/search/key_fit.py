@@ -1,75 +1,107 @@
-"""Least-squares fit of key values to the motion between keys."""
+"""Least-squares fit of key values to the motion between keys, of many tracks at once.
+
+Arrays are (C, T, ·): component, track, then key or time.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
-
 import numpy as np
 
-from anim.arrays import Floats
-from anim.maths import quaternion
+from anim.arrays import Floats, Ints
 from anim.optimization.search import playback
-from anim.sampling.track import KeyInterval
+from anim.optimization.search.key_intervals import KeyIntervals
 
-END_WEIGHT = 4.0  # weight of the first and the last time: loops and cuts must stay continuous
 NUM_GAUSS_NEWTON_STEPS = 1  # for rotations
-MAX_DENSE_VALUES = 200_000  # matrix entries; longer clips use a banded solver
-
-Solver: TypeAlias = Callable[[Floats], Floats]  # values (W, n) → keys (K, n)
+MAX_STEPS = 512  # keys of an axis up to which all tracks are solved key by key; longer ones by a banded solver
 
 
 class KeyFit:
-    """Least squares on one time axis, prepared once for all tracks that use it."""
+    """Least squares on some time axes, prepared once for all tracks that use them."""
 
-    def __init__(self, place: KeyInterval, keys: int) -> None:
-        weights = np.ones(len(place.u))
-        weights[0] = weights[-1] = END_WEIGHT
-        self._interval = place
-        is_small = len(place.u) * keys <= MAX_DENSE_VALUES
-        self.num_values = len(place.u) * (keys if is_small else 4)  # approximate, for the cache's limit
-        self._solve = (_dense if is_small else _banded)(place, keys, weights)
+    def __init__(self, axes: KeyIntervals, weights: Floats) -> None:
+        """weights: (A, W), of each axis' times."""
+        self._axes = axes
+        self._weights = weights
+        self._first = axes.at.copy()  # (A, K) the first time of each interval, that of its left key
+        self._first[:, 0] = 0
+        self._is_interval = axes.is_key
+        every = np.arange(len(axes.counts))
+        self._is_interval[every, axes.counts - 1] = axes.counts == 1
+        near, far = weights * (1 - axes.u), weights * axes.u
+        parts = self._sums(np.stack((near * (1 - axes.u), far * axes.u, near * axes.u)), every)
+        self._diagonal = parts[0]
+        self._diagonal[:, 1:] += parts[1, :, :-1]
+        self._diagonal[~axes.is_key] = 1.0
+        self._beside = parts[2, :, :-1]
 
-    def vectors(self, values: Floats) -> Floats:
-        """Return keys (K, G, C) whose linear interpolation is nearest to the values (W, G, C)."""
-        return self._solve(values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
+    def vectors(self, values: Floats, axis_of: Ints) -> Floats:
+        """Return keys (C, T, K) whose linear interpolation is nearest to the values (C, T, W).
 
-    def rotations(self, values: Floats, keys: Floats) -> Floats:
-        """Return unit keys (K, G, 4) whose slerp is nearest to the rotations (W, G, 4), starting at `keys`.
+        axis_of: (T,), the index of each track's axis.
+        """
+        weighted = values * self._weights[axis_of]
+        far = weighted * self._axes.u[axis_of]
+        sums = self._sums(np.concatenate((weighted - far, far)), axis_of)
+        right = sums[: len(values)]
+        right[..., 1:] += sums[len(values) :, :, :-1]
+        return self._solve(right, axis_of)
+
+    def rotations(self, values: Floats, keys: Floats, axis_of: Ints) -> Floats:
+        """Return unit keys (4, T, K) whose slerp is nearest to the rotations (4, T, W), starting at `keys`.
 
         Only the residual perpendicular to the curve counts: a linear fit of quaternions would also compensate the
         chord's shorter length, with keys that deviate from the motion.
         """
+        left, u = self._axes.left[axis_of], self._axes.u[axis_of]
         for _ in range(NUM_GAUSS_NEWTON_STEPS):
-            shown = playback.slerp_raw(keys, self._interval)
-            near = np.where(quaternion.dot(values, shown)[..., None] < 0, -values, values)
-            error = near - shown
-            error -= quaternion.dot(error, shown)[..., None] * shown
-            keys = quaternion.normalize(keys + self.vectors(error))
+            shown = playback.slerp_raw(keys, left, u)
+            error = np.where(playback.dot(values, shown) < 0, -values, values)
+            error -= shown
+            error -= playback.dot(error, shown) * shown
+            keys = playback.normalize(keys + self.vectors(error, axis_of))
         return keys
 
+    def _sums(self, values: Floats, axis_of: Ints) -> Floats:
+        """The sums (C, T, K) of values (C, T, W) over the intervals after each key; 0 after the last one."""
+        inside = self._is_interval[axis_of]
+        sums = np.zeros((len(values), *inside.shape))
+        firsts = (self._first[axis_of] + values.shape[2] * np.arange(len(axis_of))[:, None])[inside]
+        sums[:, inside] = np.add.reduceat(values.reshape(len(values), -1), firsts, axis=1)
+        return sums
 
-def _dense(place: KeyInterval, keys: int, weights: Floats) -> Solver:
-    """Solver with one dense matrix."""
-    hats = np.zeros((len(weights), keys))
-    every = np.arange(len(weights))
-    hats[every, place.left] += 1 - place.u
-    hats[every, place.right] += place.u
-    weighted = hats.T * weights
-    solve = np.linalg.solve(weighted @ hats, weighted)
-    return lambda values: np.asarray(solve @ values)
+    def _solve(self, right: Floats, axis_of: Ints) -> Floats:
+        """Keys (C, T, K) from the right sides of the normal equations: hat functions overlap only their neighbors'."""
+        if right.shape[2] > MAX_STEPS:
+            return self._solve_banded(right, axis_of)
+        pivots, factors = self._factorize()
+        factor = np.ascontiguousarray(factors[:, axis_of])
+        found = np.ascontiguousarray(np.moveaxis(right, 2, 0))  # (K, C, T)
+        for k in range(1, len(found)):
+            found[k] -= factor[k - 1] * found[k - 1]
+        found /= pivots[:, None, axis_of]
+        for k in range(len(found) - 2, -1, -1):
+            found[k] -= factor[k] * found[k + 1]
+        return np.moveaxis(found, 0, 2)
 
+    def _factorize(self) -> tuple[Floats, Floats]:
+        """Pivots (K, A) and factors (K - 1, A) of the normal matrices, L·D·Lᵀ with one diagonal beside the main one."""
+        pivots, beside = self._diagonal.T.copy(), np.ascontiguousarray(self._beside.T)
+        factors = np.empty_like(beside)
+        for k in range(1, len(pivots)):
+            factors[k - 1] = beside[k - 1] / pivots[k - 1]
+            pivots[k] -= factors[k - 1] * beside[k - 1]
+        return pivots, factors
 
-def _banded(place: KeyInterval, keys: int, weights: Floats) -> Solver:
-    """Solver in time and memory linear in the number of keys: hat functions overlap only their neighbors'."""
-    from scipy.linalg import solveh_banded
-    from scipy.sparse import csr_array
+    def _solve_banded(self, right: Floats, axis_of: Ints) -> Floats:
+        """The same for long axes: each is one banded system for all of its tracks."""
+        from scipy.linalg import solveh_banded
 
-    every = np.tile(np.arange(len(weights)), 2)
-    shares = np.concatenate((1 - place.u, place.u))
-    hats = csr_array((shares, (every, np.concatenate((place.left, place.right)))), shape=(len(weights), keys))
-    weighted = (hats * weights[:, None]).T.tocsr()
-    normal = weighted @ hats
-    bands = np.zeros((2, keys))
-    bands[0, 1:], bands[1] = normal.diagonal(1), normal.diagonal()
-    return lambda values: np.asarray(solveh_banded(bands, weighted @ values))
+        found = np.zeros_like(right)
+        for axis in np.unique(axis_of).tolist():
+            mine, count = np.flatnonzero(axis_of == axis), int(self._axes.counts[axis])
+            bands = np.zeros((2, count))
+            bands[0, 1:], bands[1] = self._beside[axis, : count - 1], self._diagonal[axis, :count]
+            some = right[:, mine, :count]
+            solved = solveh_banded(bands, some.reshape(-1, count).T)
+            found[:, mine, :count] = solved.T.reshape(some.shape)
+        return found

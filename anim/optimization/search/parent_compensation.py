@@ -7,7 +7,7 @@ joints: the moment arm of a hip is the thigh and no longer the whole leg, so tha
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,17 +16,20 @@ from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Skeleton
-from anim.optimization.search.candidates import Candidate, Candidates
+from anim.optimization.search import playback
+from anim.optimization.search.keyed_tracks import KeyedAxes, KeyedTracks, StoredTracks
 from anim.optimization.search.playback import level_world_matrices, required_levels
-from anim.optimization.search.source_motion import PROBE_FRAMES, SourceMotion
-from anim.optimization.search.time_axes import SharedAxis
+from anim.optimization.search.source_motion import PROBE_FRAMES, ROTATION, SourceMotion
+from anim.optimization.search.stacked_clips import StackedClips, take_clips
 
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])[:, None, None, None]
+CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])[:, None, None]
 MAX_BUDGET_GAIN = 20.0  # ratio of the moment arm to the compensated one
 
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """Nodes (n,) of one depth, their parents (n,), and their rotation tracks (n,); −1 for none."""
+    """Nodes (n,) of one depth, their parents (n,), and their rotation tracks (n, B) in each clip; −1 for none."""
 
     nodes: Ints
     parents: Ints
@@ -34,62 +37,64 @@ class _Level:
 
 
 class ParentCompensation:
-    """Computes keys level by level, from the roots down to the last rotation tracks."""
+    """Computes keys level by level, from the roots down to the last rotation tracks, of several clips."""
 
-    def __init__(self, skeleton: Skeleton, source: SourceMotion, candidates: Candidates) -> None:
-        self._source = source
-        self._candidates = candidates
-        tracks = np.full(len(skeleton), -1)
-        for i, each in enumerate(source.moving):
-            if each.path == "rotation":
-                tracks[each.node] = i
+    def __init__(self, skeleton: Skeleton, clips: StackedClips, keyed: KeyedTracks) -> None:
+        self._keyed = keyed
+        self._clips = clips
+        self._own = clips.rotation
+        tracks = np.full((len(skeleton), len(clips.sources)), -1)
+        turning = np.flatnonzero(clips.path == ROTATION)
+        tracks[clips.node[turning], clips.clip[turning]] = turning
         needed = np.zeros(len(skeleton), np.bool_)
-        for nodes in required_levels(skeleton, np.flatnonzero(tracks >= 0)):
+        for nodes in required_levels(skeleton, np.unique(clips.node[turning])):
             needed[nodes] = True
-        chosen = [nodes[needed[nodes]] for nodes in source.levels]
+        chosen = [nodes[needed[nodes]] for nodes in clips.levels]
         self._levels = [_Level(nodes, skeleton.parents[nodes], tracks[nodes]) for nodes in chosen if len(nodes)]
-        self._true = np.empty_like(source.local[1])
+        self._true = np.empty_like(self._own)
         for level, above in self._descending(self._true):
-            self._true[level.nodes] = quaternion.multiply(above, quaternion.normalize(source.local[1][level.nodes]))
+            self._true[:, level.nodes] = _multiply(above, playback.normalize(self._own[:, level.nodes]))
 
-    def follow(
-        self, axes: Sequence[SharedAxis], tolerances: Sequence[float], rotation: Floats
-    ) -> Iterator[tuple[int, Candidate]]:
-        """Yield each rotation track on an axis with its candidate.
+    def follow(self, axes: KeyedAxes, tolerances: Floats, shown: Floats, clips: Ints) -> Iterator[StoredTracks]:
+        """Yield all rotations on axes, level by level.
 
-        Writes the played values of each to `rotation` (N, W, 4).
-        tolerances: (G,) for storage, in units of values. rotation: played values of tracks without an axis.
+        Writes the played values of each to `shown` (4, M, b, W), of the `clips` (b,).
+        tolerances: (T,) for storage, in units of values. shown: rotations, before it those of tracks without an axis.
         """
-        on = np.full(len(self._source.moving) + 1, -1)  # the last entry is for nodes without a track
-        for number, axis in enumerate(axes):
-            on[list(axis.members)] = number
+        axis_of = np.append(axes.axis_of, -1)  # for nodes without a track
+        true, own = (take_clips(part, clips, 2) for part in (self._true, self._own))
+        rotation = own.copy()
+        rotation[:, self._clips.moving] = shown
         world = np.empty_like(rotation)
         for level, above in self._descending(world):
-            axis_of = on[level.tracks]
-            for number in sorted(set(axis_of[axis_of >= 0].tolist())):
-                here = np.flatnonzero(axis_of == number)
-                nodes, members = level.nodes[here], level.tracks[here].tolist()
-                found = self._candidates.compensated(
-                    axes[number], members, self._targets(nodes, above[here]), tolerances
-                )
-                for node, member, candidate in zip(nodes.tolist(), members, found, strict=True):
-                    rotation[node] = candidate.shown
-                    yield member, candidate
-            world[level.nodes] = quaternion.multiply(above, quaternion.normalize(rotation[level.nodes]))
+            tracks = level.tracks[:, clips]
+            here, clip = np.nonzero(axis_of[tracks] >= 0)
+            if len(here):
+                nodes = level.nodes[here]
+                targets = _targets(above[:, here, clip], true[:, nodes, clip], own[:, nodes, clip])
+                found = self._keyed.store(tracks[here, clip], targets, axes, tolerances)
+                rotation[:, nodes, clip] = shown[:, self._clips.row[found.tracks], clip] = found.shown
+                yield found
+            world[:, level.nodes] = _multiply(above, playback.normalize(rotation[:, level.nodes]))
 
     def _descending(self, world: Floats) -> Iterator[tuple[_Level, Floats]]:
-        """Every level with the world rotations (n, W, 4) of its nodes' parents, which callers fill in before."""
+        """Every level with the world rotations (4, n, b, W) of its nodes' parents, which callers fill in before."""
         for depth, level in enumerate(self._levels):
             if depth:
-                yield level, world[level.parents]
+                yield level, world[:, level.parents]
             else:
-                yield level, np.broadcast_to([0.0, 0.0, 0.0, 1.0], (len(level.nodes), *world.shape[1:]))
+                yield level, np.broadcast_to(IDENTITY, (4, len(level.nodes), *world.shape[2:]))
 
-    def _targets(self, nodes: Ints, above: Floats) -> Floats:
-        """Local rotations (W, n, 4) that restore the source's world orientation under parents (n, W, 4)."""
-        targets = quaternion.multiply(quaternion.conjugate(above), self._true[nodes])
-        own = self._source.local[1][nodes]
-        return np.swapaxes(np.where(quaternion.dot(targets, own)[..., None] < 0, -targets, targets), 0, 1)
+
+def _targets(above: Floats, true: Floats, own: Floats) -> Floats:
+    """Local rotations (4, n, W) that restore the world orientations `true` under parents (4, n, W), signs as `own`."""
+    targets = _multiply(above * CONJUGATE, true)
+    return np.where(playback.dot(targets, own) < 0, -targets, targets)
+
+
+def _multiply(a: Floats, b: Floats) -> Floats:
+    """The products of quaternions (4, ...)."""
+    return np.moveaxis(quaternion.multiply(np.moveaxis(a, 0, -1), np.moveaxis(b, 0, -1)), -1, 0)
 
 
 def budget_gain(skeleton: Skeleton, source: SourceMotion, points: PointMatrix) -> Floats:
@@ -99,10 +104,11 @@ def budget_gain(skeleton: Skeleton, source: SourceMotion, points: PointMatrix) -
     """
     turning = {each.node: i for i, each in enumerate(source.moving) if each.path == "rotation"}
     nth = max(1, -(-len(source.at) // PROBE_FRAMES))
-    world = level_world_matrices(skeleton, [part[:, ::nth] for part in source.local], source.levels)
+    levels = required_levels(skeleton, points.nodes)
+    world = level_world_matrices(skeleton, [part[:, ::nth] for part in source.local], levels)
     turner = np.full(len(skeleton) + 1, -1)  # nearest rotated ancestor; the last entry is for "no parent"
     reach = np.zeros(len(skeleton))
-    for level in source.levels:
+    for level in levels:
         turner[level] = turner[skeleton.parents[level]]
         for node in (node for node in level.tolist() if node in turning):
             if turner[node] >= 0:

@@ -1,8 +1,11 @@
-"""Playback of stored keys: slerp, nlerp, linear interpolation, world matrices; rotations unit or not."""
+"""Playback of stored keys: slerp, nlerp, linear interpolation, world matrices; rotations unit or not.
+
+Keys and values of many tracks are (C, T, ·): component, track, then key or time. left, u: (T, W), the key at or before
+each time, which another one follows unless there is only one, and the interpolation parameter between the two.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,47 +13,43 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
-from anim.sampling.track import MAX_MIXED_VALUES, KeyInterval
+from anim.sampling.track import MAX_MIXED_VALUES
 from anim.sampling.world import local_matrices
 
-EPSILON = np.finfo(np.float64).eps
+MIN_ANGLE = 1e-9  # rad; at this angle the weights of slerp are those of linear interpolation, in float64
 
 
-def slerp_raw(keys: Floats, place: KeyInterval) -> Floats:
-    """Return slerp (W, G, 4) between stored quaternions (K, G, 4), not normalized, as in three.js."""
-    a, b = keys[:-1], keys[1:]
-    b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
-    theta = 2 * np.arctan2(_length(b - a), _length(b + a))  # (K - 1, G)
-    left = np.minimum(place.left, max(len(keys) - 2, 0))
-    u = np.where(place.left == left, place.u, 1.0)[:, None]
-    shown = np.empty((len(u), *keys.shape[1:]))
-    count = max(MAX_MIXED_VALUES // max(math.prod(keys.shape[1:]), 1), 1)
-    for first in range(0, len(shown), count):
+def slerp_raw(keys: Floats, left: Ints, u: Floats) -> Floats:
+    """Return slerp (4, T, W) between stored quaternions (4, T, K), not normalized, as in three.js."""
+    if keys.shape[2] == 1:
+        return np.repeat(keys, left.shape[1], axis=2)
+    a, b = keys[..., :-1], keys[..., 1:]
+    b = np.where(dot(a, b) < 0, -b, b)
+    angle = np.maximum(2 * np.arctan2(_length(b - a), _length(b + a)), MIN_ANGLE)  # (T, K - 1)
+    ends = np.concatenate((a, b)) / np.sin(angle)
+    shown = np.empty((4, *left.shape))
+    count = max(MAX_MIXED_VALUES // max(4 * len(left), 1), 1)
+    for first in range(0, left.shape[1], count):
         some = slice(first, first + count)
-        shown[some] = _slerp(a, b, theta, left[some], u[some])
+        theta, parameter = _take(angle[None], left[:, some])[0], u[:, some]
+        near = _take(ends, left[:, some])
+        near[:4] *= np.sin((1 - parameter) * theta)
+        near[4:] *= np.sin(parameter * theta)
+        np.add(near[:4], near[4:], out=shown[..., some])
     return shown
 
 
-def _slerp(a: Floats, b: Floats, theta: Floats, left: Ints, u: Floats) -> Floats:
-    """Slerp (F, G, 4) between keys `left` (F,) of a and b (K, G, 4), `theta` (K, G) rad apart, at u (F, 1)."""
-    angle = theta[left]
-    whole = _sine_ratio(angle)
-    of_a = (1 - u) * _sine_ratio((1 - u) * angle) / whole
-    of_b = u * _sine_ratio(u * angle) / whole
-    return np.asarray(of_a[..., None] * a[left] + of_b[..., None] * b[left])
+def nlerp(keys: Floats, left: Ints, u: Floats) -> Floats:
+    """Return nlerp (4, T, W) between quaternions (4, T, K), as in Unity's glTFast."""
+    a, b = _ends(keys, left)
+    b = np.where(dot(a, b) < 0, -b, b)
+    return normalize((1 - u) * a + u * b)
 
 
-def nlerp(keys: Floats, place: KeyInterval) -> Floats:
-    """Return nlerp (W, G, 4) between quaternions (K, G, 4), as in Unity's glTFast."""
-    a, b = keys[place.left], keys[place.right]
-    b = np.where(quaternion.dot(a, b)[..., None] < 0, -b, b)
-    return quaternion.normalize(a + place.u[:, None, None] * (b - a))
-
-
-def linear_error(keys: Floats, place: KeyInterval) -> Floats:
-    """Return linear interpolation (W, G, C) between vectors (K, G, C)."""
-    a = keys[place.left]
-    return np.asarray(a + place.u[:, None, None] * (keys[place.right] - a))
+def lerp(keys: Floats, left: Ints, u: Floats) -> Floats:
+    """Return linear interpolation (C, T, W) between vectors (C, T, K)."""
+    a, b = _ends(keys, left)
+    return np.asarray((1 - u) * a + u * b)
 
 
 def arc_distance(angle: Floats) -> Floats:
@@ -64,6 +63,19 @@ def arc_distance(angle: Floats) -> Floats:
 def steps(keys: Floats) -> Floats:
     """Return the angles (K - 1, ...) in radians between neighboring rotations (K, ..., 4)."""
     return quaternion.angle_between(keys[:-1], keys[1:])
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Return the dot products (...) of quaternions (4, ...)."""
+    total = a[0] * b[0]
+    for i in range(1, len(a)):
+        total += a[i] * b[i]
+    return np.asarray(total)
+
+
+def normalize(keys: Floats) -> Floats:
+    """Return quaternions (4, ...) scaled to unit length."""
+    return np.asarray(keys / _length(keys))
 
 
 def required_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
@@ -84,12 +96,17 @@ def level_world_matrices(skeleton: Skeleton, local: Sequence[Floats], levels: Se
     return matrix.accumulate_world(local_matrices(skeleton, local), skeleton.parents, list(levels))
 
 
-def _sine_ratio(angle: Floats) -> Floats:
-    """sin(angle) / angle, as np.sinc computes it, without its overhead per call."""
-    scaled = np.pi * (angle / np.pi)
-    divisor = np.where(scaled, scaled, EPSILON)
-    return np.asarray(np.sin(divisor) / divisor)
+def _ends(keys: Floats, left: Ints) -> tuple[Floats, Floats]:
+    """The keys (C, T, W) at the two ends of each interval."""
+    return _take(keys, left), _take(keys, np.minimum(left + 1, keys.shape[2] - 1))
+
+
+def _take(keys: Floats, index: Ints) -> Floats:
+    """The keys (C, T, W) of tracks (C, T, K) by index (T, W)."""
+    flat = index + keys.shape[2] * np.arange(len(index))[:, None]
+    found: Floats = np.take(keys.reshape(len(keys), -1), flat, axis=1)
+    return found
 
 
 def _length(vectors: Floats) -> Floats:
-    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1)))
+    return np.asarray(np.sqrt(dot(vectors, vectors)))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Generator
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
 from anim.arrays import Floats
 from anim.optimization.options import Effort
 from anim.optimization.search.plan import Plan, RotationTarget, TrialResult
-from anim.optimization.search.trial import TrialRunner
+from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.trial import Trial
 from anim.optimization.tracks import quantization
 
 INITIAL_BUDGET_FRACTION = 1 / 3  # of the bound, for every track
@@ -28,57 +31,67 @@ CHANGED_TRACK_FRACTION = 0.3  # of tracks, per random change
 MIN_SHRINK = 1e-6  # of the initial budget; below it the storage is the limit
 
 
-def search(runner: TrialRunner, bound: float, effort: Effort) -> TrialResult | None:
-    """Return the smallest trial result found within all bounds; None if there is none.
+Search: TypeAlias = Generator[Trial, TrialResult | None, TrialResult | None]
+Step: TypeAlias = Generator[Trial, TrialResult | None, None]
 
-    bound: m, only for the size of budgets; acceptance depends on the result's bound usage.
+
+def search(source: SourceMotion, bound: float, effort: Effort, leeway: Callable[[], Floats]) -> Search:
+    """Yield trials of one clip, of which it takes the results; return the smallest within all bounds, None without one.
+
+    bound: m, only for the size of budgets; acceptance depends on the result's bound usage. leeway: the ratio of each
+    track's moment arm to the compensated one (G,).
     """
-    return _Search(runner, bound, effort).run()
+    return _Search(source, bound, effort, leeway).run()
 
 
 class _Search:
-    def __init__(self, runner: TrialRunner, bound: float, effort: Effort) -> None:
-        self._runner = runner
+    def __init__(self, source: SourceMotion, bound: float, effort: Effort, leeway: Callable[[], Floats]) -> None:
+        self._source = source
         self._bound = bound
         self._effort = effort
+        self._find_leeway = leeway
         self._best: TrialResult | None = None
 
-    def run(self) -> TrialResult | None:
-        self._find_first()
+    @property
+    def _leeway(self) -> Floats:
+        return self._find_leeway()
+
+    def run(self) -> Search:
+        yield from self._find_first()
         for _ in range(self._effort.cycles if self._best else 0):
             before = self._best
-            self._run_cycle()
+            yield from self._run_cycle()
             if self._best is before:
                 break
         return self._best
 
-    def _find_first(self) -> None:
-        tracks = len(self._runner.source.moving)
+    def _find_first(self) -> Step:
+        tracks = len(self._source.moving)
         start = Plan(np.full(tracks, INITIAL_BUDGET_FRACTION * self._bound), 0.0, "merged", np.ones(tracks))
-        self._adapt(start, self._effort.rounds)
-        if self._best is None and not self._runner.source.own.all():
+        yield from self._adapt(start, self._effort.rounds)
+        if self._best is None and not self._source.own.all():
             start = replace(start, axes="own")
-            self._adapt(start, self._effort.rounds)
+            yield from self._adapt(start, self._effort.rounds)
         if self._best is None:
             for fraction in self._effort.thresholds:
-                self._adapt(replace(start, threshold=fraction * self._bound), self._effort.rounds)
+                yield from self._adapt(replace(start, threshold=fraction * self._bound), self._effort.rounds)
         if self._best is None:
-            self._shrink(start)
+            yield from self._shrink(start)
 
-    def _run_cycle(self) -> None:
+    def _run_cycle(self) -> Step:
         """Try every kind of change in turn, each on the best result so far."""
         assert self._best is not None
         for fraction in self._effort.thresholds:
             plan = replace(self._best.plan, threshold=fraction * self._bound)
-            self._adapt(replace(plan, budgets=0.9 * plan.budgets), self._effort.rounds)
-        self._favor_long()
+            yield from self._adapt(replace(plan, budgets=0.9 * plan.budgets), self._effort.rounds)
+        yield from self._favor_long()
         for axes in self._effort.axes:
-            self._adapt(replace(self._best.plan, axes=axes), max(self._effort.rounds // 2, 2))
-        self._compensate_parents()
-        self._finish()
-        self._coarsen_each()
+            yield from self._adapt(replace(self._best.plan, axes=axes), max(self._effort.rounds // 2, 2))
+        yield from self._compensate_parents()
+        yield from self._finish()
+        yield from self._coarsen_each()
 
-    def _favor_long(self) -> None:
+    def _favor_long(self) -> Step:
         """Try larger budgets for tracks with many bytes.
 
         The number of keys n falls about as budget^-½, so that the sum of bytes under a fixed sum of budgets is least
@@ -91,9 +104,11 @@ class _Search:
             lengths[i] = self._best.keys[i].values.size
         mean = lengths[lengths > 0].mean() if lengths.any() else 1.0
         fraction = np.where(lengths > 0, lengths / mean, 1.0)
-        self._adapt(replace(plan, budgets=plan.budgets * fraction ** (2 / 3)), self._effort.long_track_rounds)
+        yield from self._adapt(
+            replace(plan, budgets=plan.budgets * fraction ** (2 / 3)), self._effort.long_track_rounds
+        )
 
-    def _compensate_parents(self) -> None:
+    def _compensate_parents(self) -> Step:
         """Try world-space compensation, with increasing budgets for tracks with a long moment arm."""
         for fraction in self._effort.leeways:
             before = self._best
@@ -101,23 +116,23 @@ class _Search:
             plan = replace(
                 before.plan,
                 rotation_target=RotationTarget.WORLD,
-                budgets=before.plan.budgets * self._runner.leeway**fraction,
+                budgets=before.plan.budgets * self._leeway**fraction,
             )
-            self._adapt(plan, self._effort.rounds)
+            yield from self._adapt(plan, self._effort.rounds)
             if self._best is before:
                 break
 
-    def _attempt(self, plan: Plan) -> None:
+    def _attempt(self, plan: Plan) -> Step:
         """Try a plan; it is measured only if it takes fewer bytes than the best."""
         limit = math.inf if self._best is None else self._best.size
-        outcome = self._runner.run_smaller(plan, limit)
+        outcome = yield Trial(plan, limit=limit)
         if outcome is not None:
             self._keep_smaller(outcome)
 
-    def _measure(self, plan: Plan) -> TrialResult:
+    def _measure(self, plan: Plan) -> Generator[Trial, TrialResult | None, TrialResult]:
         """Try a plan, and return its result."""
-        limit = math.inf if self._best is None else self._best.size
-        outcome = self._runner.run(plan, smaller_than=limit)
+        outcome = yield Trial(plan, smaller_than=math.inf if self._best is None else self._best.size)
+        assert outcome is not None
         self._keep_smaller(outcome)
         return outcome
 
@@ -125,58 +140,59 @@ class _Search:
         if outcome.worst <= 1 and (self._best is None or outcome.size < self._best.size):
             self._best = outcome
 
-    def _adapt(self, plan: Plan, rounds: int) -> None:
+    def _adapt(self, plan: Plan, rounds: int) -> Step:
         """Try a plan, adjust each budget by the usage of the points it moves, and repeat."""
         for _ in range(rounds - 1):
-            plan = replace(plan, budgets=self._next_budgets(plan.budgets, self._measure(plan)))
+            outcome = yield from self._measure(plan)
+            plan = replace(plan, budgets=self._next_budgets(plan.budgets, outcome))
         if rounds:
-            self._attempt(plan)
+            yield from self._attempt(plan)
 
     def _next_budgets(self, budgets: Floats, outcome: TrialResult) -> Floats:
-        source = self._runner.source
+        source = self._source
         usage = source.answering.largest(outcome.usage, [each.node for each in source.moving])
         usage = np.maximum(usage, outcome.own)
         factor = np.clip((TARGET_USAGE / np.maximum(usage, 1e-9)) ** FEEDBACK_EXPONENT, *BUDGET_FACTOR_RANGE)
-        gain = self._runner.leeway if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
+        gain = self._leeway if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
         return np.asarray(np.minimum(budgets * factor, MAX_BUDGET_PER_BOUND * self._bound * gain))
 
-    def _shrink(self, plan: Plan) -> None:
+    def _shrink(self, plan: Plan) -> Step:
         """Reduce budgets until all bounds hold."""
         factor = SHRINK_FACTOR
         while self._best is None and factor > MIN_SHRINK:
-            self._attempt(replace(plan, budgets=plan.budgets * factor))
+            yield from self._attempt(replace(plan, budgets=plan.budgets * factor))
             factor *= SHRINK_FACTOR
 
-    def _finish(self) -> None:
+    def _finish(self) -> Step:
         """Try slightly larger budgets, other storage formats, and random changes."""
         assert self._best is not None
         plan = self._best.plan
         for factor in self._effort.finishing:
-            self._attempt(replace(plan, budgets=plan.budgets * factor))
-        self._store_coarser()
-        self._random_trials(self._effort.random_trials)
+            yield from self._attempt(replace(plan, budgets=plan.budgets * factor))
+        yield from self._store_coarser()
+        yield from self._random_trials(self._effort.random_trials)
 
-    def _coarsen_each(self) -> None:
+    def _coarsen_each(self) -> Step:
         """Try coarser storage, track by track."""
         for _ in range(self._effort.coarsen_passes):
             before = self._best
             assert before is not None
             for i in sorted(before.on, key=lambda i: -_length(self._best, i))[: self._max_single_trials]:
                 if self._may_be_coarser(i):
-                    self._attempt(self._coarser(i, 2.0))
+                    yield from self._attempt(self._coarser(i, 2.0))
             if self._best is before:
                 break
 
     def _may_be_coarser(self, track: int) -> bool:
         """Return whether twice the storage error is predicted to fit; the stored error is half its tolerance."""
         assert self._best is not None
-        source = self._runner.source
+        source = self._source
         used = float(self._best.usage[source.answering.of(source.moving[track].node)].max(initial=0.0))
-        gain = self._runner.leeway[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
+        gain = self._leeway[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
         miss = self._best.keys[track].error
         return miss > 0 and used + miss * source.moving[track].meters / gain / 2 / self._bound < MAX_FORESEEN_USAGE
 
-    def _store_coarser(self) -> None:
+    def _store_coarser(self) -> Step:
         """Try integers for each rotation stored as float32."""
         assert self._best is not None
         for i, stored in sorted(self._best.keys.items())[: self._max_single_trials]:
@@ -185,12 +201,12 @@ class _Search:
                 and len(stored.values) > quantization.MAX_FLOAT32_KEYS
                 and stored.values.shape[1] == 4
             ):
-                self._attempt(self._coarser(i, INT16_COARSENING))
+                yield from self._attempt(self._coarser(i, INT16_COARSENING))
 
     @property
     def _max_single_trials(self) -> int:
         """Maximum number of trials in a pass that change one track each: a trial takes time for all tracks."""
-        return MAX_TRACK_TRIALS // max(len(self._runner.source.moving), 1)
+        return MAX_TRACK_TRIALS // max(len(self._source.moving), 1)
 
     def _coarser(self, track: int, factor: float) -> Plan:
         assert self._best is not None
@@ -198,7 +214,7 @@ class _Search:
         coarser[track] *= factor
         return replace(self._best.plan, coarser=coarser)
 
-    def _random_trials(self, count: int) -> None:
+    def _random_trials(self, count: int) -> Step:
         """Try random changes of some budgets, smaller after failures; the seed is fixed."""
         if not count:
             return  # numpy's random numbers are not imported
@@ -209,7 +225,7 @@ class _Search:
             assert best is not None
             tracks = len(best.plan.budgets)
             changes = spread * chance.standard_normal(tracks) * (chance.random(tracks) < CHANGED_TRACK_FRACTION)
-            self._attempt(replace(best.plan, budgets=best.plan.budgets * np.exp(changes)))
+            yield from self._attempt(replace(best.plan, budgets=best.plan.budgets * np.exp(changes)))
             spread = spread * 1.3 if self._best is not best else max(0.96 * spread, LOG_DEVIATIONS[1])
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,7 @@ from anim.curves.fitting.key_reduction import KEYS_PER_PART
 
 SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
-MAX_STACKED_VALUES = 8_000_000  # of a table, in one call
+MAX_STACKED_VALUES = 1_000_000  # of tables, in one search: 4 MB
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
 
@@ -27,7 +29,6 @@ class SegmentErrors:
 
     def __init__(self, values: Floats, times: Floats, limit: float) -> None:
         tracks, count, _ = values.shape
-        self._count = count
         span = _span(times)
         errors = np.empty((span, count, tracks), np.float32)  # in the order of the loop: what it leaves takes no memory
         bent = np.arange(tracks)
@@ -44,41 +45,79 @@ class SegmentErrors:
         # [e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
         self._errors = errors[:longest].transpose(1, 2, 0)
 
-    def greedy_keys(self, tracks: Ints, budgets: Floats) -> Bools:
-        """Return the keys (k, K) of the `tracks` (k,) so that no segment's error exceeds the budget (k,) in m."""
-        keep = np.ones((len(tracks), self._count), np.bool_)
-        parts = max(MAX_STACKED_VALUES // (len(tracks) * self._errors.shape[2] * KEYS_PER_PART), 1)
-        for start in range(1, self._count, parts * KEYS_PER_PART):
-            stacked = slice(start, start + parts * KEYS_PER_PART)
-            shares = self._errors[stacked, tracks] * (1 / budgets).astype(np.float32)[:, None]
-            costs = np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
-            keep[:, stacked] = _fewest_keys(costs)
-        return keep
+    def costs(self, tracks: Ints, budgets: Floats) -> NDArray[np.float32]:
+        """Return the costs (K, k, span) of segments that end at each key of the `tracks` (k,) under budgets (k,) in m.
+
+        About 1 within the budget, inf above it and where there is no segment.
+        """
+        shares = self._errors[:, tracks] * (1 / budgets).astype(np.float32)[:, None]
+        return np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
 
 
-def _fewest_keys(costs: NDArray[np.float32]) -> Bools:
-    """Keys (k, n) after a first one on the paths of least cost to the last one, through those between two parts.
+def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Bools]:
+    """Return the keys (k, K) of the tracks (k,) of each table, so that no segment's error exceeds its budget (k,) in m.
 
-    costs: (n, k, span) of the segments that end at each key; inf where none does. All parts are searched at once.
+    Tables are searched together, so many at a time as memory allows.
     """
+    found: list[Bools] = []
+    waiting: list[NDArray[np.float32]] = []
+    size = 0
+    for errors, tracks, budgets in asked:
+        costs = errors.costs(tracks, budgets)
+        is_long = len(costs) > KEYS_PER_PART
+        if waiting and (is_long or size + costs.size > MAX_STACKED_VALUES):
+            found += _stacked_keys(waiting)
+            waiting, size = [], 0
+        if is_long:
+            found.append(_keys_of_parts(costs))
+        else:
+            waiting.append(costs)
+            size += costs.size
+    return found + (_stacked_keys(waiting) if waiting else [])
+
+
+def _stacked_keys(tables: Sequence[NDArray[np.float32]]) -> list[Bools]:
+    """The keys (k, K) of each table of costs (K, k, span): the first, and those on the paths of least cost."""
+    counts = [len(costs) for costs in tables]
+    tracks = [costs.shape[1] for costs in tables]
+    stacked = np.full((max(counts), sum(tracks), max(costs.shape[2] for costs in tables)), np.inf, np.float32)
+    ends = np.cumsum(tracks)
+    for costs, end in zip(tables, ends.tolist(), strict=True):
+        stacked[: len(costs), end - costs.shape[1] : end, : costs.shape[2]] = costs
+    keep = _fewest_keys(stacked[1:], np.repeat(counts, tracks) - 1)
+    return [part[:, :count] for part, count in zip(np.split(keep, ends[:-1]), counts, strict=True)]
+
+
+def _keys_of_parts(costs: NDArray[np.float32]) -> Bools:
+    """The same for long tracks: all parts of KEYS_PER_PART keys are searched at once, and a key stays between two."""
     count, tracks, span = costs.shape
-    length = min(count, KEYS_PER_PART)
-    parts = -(-count // length)
-    missing = np.full((parts * length - count, tracks, span), np.inf, np.float32)
-    rows = np.concatenate((costs, missing)) if len(missing) else costs
-    rows = rows.reshape(parts, length, tracks, span).transpose(1, 2, 0, 3).reshape(length, tracks * parts, span)
-    total = np.full((tracks * parts, length + 1), np.inf, np.float32)
+    parts = -(-(count - 1) // KEYS_PER_PART)
+    last = np.append(np.full(parts - 1, KEYS_PER_PART), count - 1 - (parts - 1) * KEYS_PER_PART)
+    rows = np.full((parts * KEYS_PER_PART, tracks, span), np.inf, np.float32)
+    rows[: count - 1] = costs[1:]
+    rows = rows.reshape(parts, KEYS_PER_PART, tracks, span).transpose(1, 2, 0, 3)
+    keep = _fewest_keys(rows.reshape(KEYS_PER_PART, tracks * parts, span), np.tile(last, tracks))
+    inner = keep[:, 1:].reshape(tracks, parts * KEYS_PER_PART)[:, : count - 1]
+    return np.concatenate((np.ones((tracks, 1), np.bool_), inner), axis=1)
+
+
+def _fewest_keys(costs: NDArray[np.float32], last: Ints) -> Bools:
+    """Mask (R, n + 1) of the first key and those on the paths of least cost from it to the keys `last` (R,).
+
+    costs: (n, R, span) of the segments that end at each key after the first; inf where none does.
+    """
+    count, rows, span = costs.shape
+    total = np.full((rows, count + 1), np.inf, np.float32)
     total[:, 0] = 0
-    came = np.zeros((tracks * parts, length + 1), np.int64)
-    every = np.arange(tracks * parts)
-    for end in range(1, length + 1):
+    came = np.zeros((rows, count + 1), np.int64)
+    every = np.arange(rows)
+    for end in range(1, count + 1):
         width = min(span, end)
-        totals = total[:, end - width : end][:, ::-1] + rows[end - 1, :, :width]
+        totals = total[:, end - width : end][:, ::-1] + costs[end - 1, :, :width]
         best = totals.argmin(axis=1)
         total[:, end] = totals[every, best]
         came[:, end] = end - 1 - best
-    last = np.tile(np.append(np.full(parts - 1, length), count - (parts - 1) * length), tracks)
-    return _trace(came, last)[:, 1:].reshape(tracks, parts * length)[:, :count]
+    return _trace(came, last)
 
 
 def _span(times: Floats) -> int:
@@ -94,19 +133,23 @@ def _segment_error(values: Floats, times: Floats, length: int) -> Floats:
     a = values[..., :starts]
     change = values[..., length:] - a
     whole = times[length:] - times[:starts]
-    error = np.empty_like(a)
+    error = np.empty_like(change)
     for inner in range(1, length):
         np.multiply((times[inner : inner + starts] - times[:starts]) / whole, change, out=error)
         error += a
         error -= values[..., inner : inner + starts]
         error *= error
-        np.maximum(largest, error.sum(axis=0), out=largest)
+        total = error[0]
+        for each in error[1:]:
+            total += each
+        np.maximum(largest, total, out=largest)
     return np.asarray(np.sqrt(largest))
 
 
 def _trace(came: Ints, last: Ints) -> Bools:
     """Mask (R, K) of the keys on the optimal paths, traced back in `came` (R, K) from the keys `last` (R,)."""
     keep = np.zeros(came.shape, np.bool_)
+    keep[:, 0] = True
     for row, at, kept in zip(came, last.tolist(), keep, strict=True):
         before = row.tolist()
         path = []

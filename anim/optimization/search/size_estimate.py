@@ -34,11 +34,11 @@ class SizeEstimate:
 
         tolerances: (G,) of the storage, in units of values. Tracks that are further apart are taken for different.
         """
-        counts = [int(axis.keys.sum()) for axis in axes]
         moving: dict[tuple[int, int], float] = {}
         for n, axis in enumerate(axes):
+            count = axis.num_keys
             for i in axis.members:
-                size = self._coding.min_size(counts[n], self._paths[i], tolerances[i])
+                size = self._coding.min_size(count, self._paths[i], tolerances[i])
                 name = n, self._first_similar[i]
                 moving[name] = min(moving.get(name, size), size)
         return self._overhead(actions, axes, len(moving)) + sum(moving.values())
@@ -52,11 +52,10 @@ class SizeEstimate:
         prices = self._coding.byte_costs
         text = (
             prices.track * num_moving
-            + prices.repeated * ((actions == TrackAction.KEYED).sum() - num_moving)
-            + prices.single_key * (actions == TrackAction.CONSTANT).sum()
+            + prices.repeated * (np.count_nonzero(actions == TrackAction.KEYED) - num_moving)
+            + prices.single_key * np.count_nonzero(actions == TrackAction.CONSTANT)
         )
-        times = sum(prices.axis + self._coding.time_bytes * axis.keys.sum() for axis in axes)
-        return float(text + times)
+        return text + sum(prices.axis + self._coding.time_bytes * axis.num_keys for axis in axes)
 
 
 def _first_similar(source: SourceMotion) -> list[int]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints, unique_sorted
-from anim.maths import matrix, quaternion
-from anim.measure.error.point_matrix import PointMatrix, stack_points
+from anim.maths import quaternion
+from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.model.time_axis import merge_times
 from anim.optimization.options import Reference
@@ -19,7 +19,6 @@ from anim.optimization.search.playback import level_world_matrices, required_lev
 from anim.optimization.tracks.clip_ends import closure_sign
 from anim.sampling import PoseSampler, times
 from anim.sampling.players import sampler
-from anim.sampling.world import local_matrices
 
 CUBIC_STEP = 1 / 60  # s; sample step of splines, with at least CUBIC_SEGMENTS samples per segment
 CUBIC_SEGMENTS = 8
@@ -58,9 +57,9 @@ class SourceMotion:
 
     grid: (K,) s, possible key times. at: (W,) s, the grid and times between. on_grid: (K,) indices of the grid in `at`.
     moving: (G) tracks of the search. own: (G, K) mask of source keys, all for splines. answering: the points that the
-    node of each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes.
-    points: on nodes that move in their parents' space, or are roots. levels: of these nodes. columns: (4 J, 3 W) world
-    matrices of the points' nodes; by_chord: the same with nlerp.
+    node of each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes. world:
+    (N, W, 3, 4), of nodes with points and those above. chords: rotation (N, W, 4) with nlerp; None where it hardly
+    differs.
     """
 
     grid: Floats
@@ -70,10 +69,8 @@ class SourceMotion:
     own: Bools
     answering: AnsweringPoints
     local: tuple[Floats, Floats, Floats]
-    points: PointMatrix
-    levels: tuple[Ints, ...]
-    columns: Floats
-    by_chord: Floats
+    world: Floats
+    chords: Floats | None
 
 
 def analyze_source(
@@ -96,23 +93,15 @@ def analyze_source(
     at = grid if reference is Reference.KEYS else measurement_times(grid, clip.tracks)
     poses = PoseSampler(skeleton, clip)
     local = _local(poses, at)
-    matrices = local_matrices(skeleton, local)
     levels = required_levels(skeleton, points.nodes)
-    world = matrix.accumulate_world(matrices, skeleton.parents, list(levels))
+    world = level_world_matrices(skeleton, local, levels)
     nodes = {track.node for track in tracks if track.node is not None}
     reach = _influence_radius(world, points, answering, nodes)
-    widening = _widening(skeleton, world, levels)
-    moving = _source_tracks(clip, free, skeleton, local, reach, widening, chord_tolerance)
-    points = _on_moving_nodes(points, skeleton, matrices, levels, nodes)
-    levels = required_levels(skeleton, points.nodes)
-    columns = stack_points(world, points.nodes)
-    del matrices, world  # large for long clips
-    by_chord = columns
-    if any(
+    moving = _source_tracks(clip, free, skeleton, local, reach, _widening(skeleton, world, levels), chord_tolerance)
+    is_bent = any(
         each.path == "rotation" and each.meters * _max_chord_error(clip.tracks[each.index]) > chord_tolerance
         for each in moving
-    ):
-        by_chord = stack_points(level_world_matrices(skeleton, _nlerp_local(poses, at, local), levels), points.nodes)
+    )
     return SourceMotion(
         grid,
         at,
@@ -121,10 +110,8 @@ def analyze_source(
         np.array([_source_keys(track, grid) for track in tracks]).reshape(len(tracks), len(grid)),
         answering,
         local,
-        points,
-        levels,
-        columns,
-        by_chord,
+        world,
+        _chords(poses, at) if is_bent else None,
     )
 
 
@@ -157,13 +144,13 @@ def _local(poses: PoseSampler, at: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _by_node(values: Floats) -> Floats:
-    """Values (N, W, C) from (W, N, C)."""
-    return np.ascontiguousarray(np.swapaxes(values, 0, 1))
+    """Values (N, W, C) from (W, N, C), a view of (C, N, W): each component is contiguous over the times."""
+    return np.moveaxis(np.ascontiguousarray(np.transpose(values, (2, 1, 0))), 0, 2)
 
 
-def _nlerp_local(poses: PoseSampler, at: Floats, local: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
-    """The same in players with component-wise interpolation."""
-    return local[0], np.swapaxes(poses.sampled(sampler("nlerp")).at(at).rotation, 0, 1), local[2]
+def _chords(poses: PoseSampler, at: Floats) -> Floats:
+    """Rotations (N, W, 4) in players with component-wise interpolation."""
+    return _by_node(poses.sampled(sampler("nlerp")).at(at).rotation)
 
 
 def _max_chord_error(track: Track) -> float:
@@ -236,24 +223,6 @@ def _influence_radius(
     chosen = sorted(nodes)
     centers = np.swapaxes(frames[chosen, :, :, 3], 1, 2)
     return dict(zip(chosen, answering.radii(places, chosen, centers).tolist(), strict=True))
-
-
-def _on_moving_nodes(
-    points: PointMatrix, skeleton: Skeleton, local: Floats, levels: Sequence[Ints], free: Set[int]
-) -> PointMatrix:
-    """The points on their nearest nodes that move in their parents' space, or are `free` to: fewer world matrices.
-
-    local: matrices (N, W, 3, 4). levels: of the nodes with points.
-    """
-    moves = (local != local[:, :1]).any(axis=(1, 2, 3))
-    moves[list(free)] = True
-    nearest, offsets = np.arange(len(skeleton)), np.tile(np.eye(4)[:3], (len(skeleton), 1, 1))
-    for level in levels[1:]:
-        constant = level[~moves[level]]
-        above = skeleton.parents[constant]
-        nearest[constant] = nearest[above]
-        offsets[constant] = matrix.multiply(offsets[above], local[constant, 0])
-    return points.rebind(nearest, offsets)
 
 
 def _widening(skeleton: Skeleton, world: Floats, levels: Sequence[Ints]) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import greedy_keys, joint_greedy_keys
+from anim.optimization.search import segment_errors
 from anim.optimization.search.segment_errors import SegmentErrors, fits
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.tracks.quantization import Encoding
 
 CONSTANT_TOLERANCE = 0.1  # of the bound: tracks this close to their middle value get no table
 MAX_BUDGET_PER_BOUND = 4.0  # larger budgets are rare
+MAX_STACKED_PAIRS = 1_000_000  # of groups of tracks whose axes are merged at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,43 +27,97 @@ class SharedAxis:
     keys: Bools
     members: tuple[int, ...]
 
+    @property
+    def num_keys(self) -> int:
+        """Number of the keys."""
+        return int(np.count_nonzero(self.keys))
 
-def merge_axes(keep: Bools, key_bytes: Floats, *, axis_bytes: float, time_bytes: float) -> list[SharedAxis]:
-    """Return the axes of fewest bytes found for tracks that require the keys `keep` (G, K).
 
-    key_bytes: (G,) of one key of each track. An axis costs `axis_bytes` and `time_bytes` per key. The pair whose
-    union saves most is merged until none saves anything.
+def merge_axes(
+    asked: Sequence[tuple[Bools, Floats]], *, axis_bytes: float, time_bytes: float
+) -> list[list[SharedAxis]]:
+    """Return for each clip the axes of fewest bytes found for its tracks, which require the keys `keep` (G, K).
+
+    asked: `keep`, and the bytes (G,) of one key of each track. An axis costs `axis_bytes` and `time_bytes` per key. The
+    pair whose union saves most is merged until none saves anything.
     """
-    groups: dict[bytes, list[int]] = {}
-    for i, row in enumerate(keep):
-        groups.setdefault(row.tobytes(), []).append(i)
-    members = list(groups.values())
-    if len(members) == 1:
-        return [SharedAxis(keep[0], tuple(members[0]))]
-    sets = np.array([keep[m[0]] for m in members], np.float64)
-    width = np.array([key_bytes[m].sum() for m in members])
-    count = sets.sum(axis=1)
+    merges = [_Groups(keep, key_bytes) for keep, key_bytes in asked]
+    found: list[list[SharedAxis]] = []
+    for some in _stackable(merges):
+        found += _merge_groups(some, axis_bytes, time_bytes)
+    return found
+
+
+class _Groups:
+    """The tracks of a clip in groups of equal keys. keys: (G', K). width: (G',) bytes of one key of a group."""
+
+    def __init__(self, keep: Bools, key_bytes: Floats) -> None:
+        groups: dict[bytes, list[int]] = {}
+        for i, row in enumerate(keep):
+            groups.setdefault(row.tobytes(), []).append(i)
+        self.members = list(groups.values())
+        self.keys = keep[[each[0] for each in self.members]]
+        self.width = np.array([key_bytes[each].sum() for each in self.members])
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+
+def _stackable(merges: Sequence[_Groups]) -> Iterator[list[_Groups]]:
+    """Parts of the list whose pairs of groups together fit in memory."""
+    some: list[_Groups] = []
+    for each in merges:
+        if some and (len(some) + 1) * max(len(each), *map(len, some)) ** 2 > MAX_STACKED_PAIRS:
+            yield some
+            some = []
+        some.append(each)
+    if some:
+        yield some
+
+
+def _merge_groups(clips: Sequence[_Groups], axis_bytes: float, time_bytes: float) -> list[list[SharedAxis]]:
+    """The axes of each clip; in each step one pair of groups is merged in every clip that is not finished."""
+    most, length = max(map(len, clips)), max(each.keys.shape[1] for each in clips)
+    sets, width = np.zeros((len(clips), most, length)), np.zeros((len(clips), most))
+    alive = np.zeros((len(clips), most), np.bool_)
+    for n, each in enumerate(clips):
+        sets[n, : len(each), : each.keys.shape[1]], width[n, : len(each)] = each.keys, each.width
+        alive[n, : len(each)] = True
+    count = sets.sum(axis=2)
     cost = axis_bytes + count * (time_bytes + width)
-    union = count[:, None] + count - sets @ sets.T
-    gain = cost[:, None] + cost - axis_bytes - union * (time_bytes + width[:, None] + width)
-    np.fill_diagonal(gain, -np.inf)
-    alive = np.ones(len(members), np.bool_)
-    for _ in range(len(members) - 1):
-        a, b = divmod(int(gain.argmax()), len(members))
-        if gain[a, b] <= 0:
-            break
-        sets[a] = np.maximum(sets[a], sets[b])
-        members[a] = members[a] + members[b]
-        width[a] += width[b]
-        count[a] = sets[a].sum()
-        cost[a] = axis_bytes + count[a] * (time_bytes + width[a])
-        alive[b] = False
-        gain[b] = gain[:, b] = -np.inf
-        union_a = count[a] + count - sets @ sets[a]
-        row = cost[a] + cost - axis_bytes - union_a * (time_bytes + width[a] + width)
-        row[~alive] = row[a] = -np.inf
-        gain[a] = gain[:, a] = row
-    return [SharedAxis(sets[a] > 0, tuple(members[a])) for a in np.flatnonzero(alive).tolist()]
+    union = count[:, :, None] + count[:, None] - sets @ sets.transpose(0, 2, 1)
+    gain = cost[:, :, None] + cost[:, None] - axis_bytes - union * (time_bytes + width[:, :, None] + width[:, None])
+    gain[:, range(most), range(most)] = -np.inf
+    gain[~(alive[:, :, None] & alive[:, None])] = -np.inf
+    while True:
+        pair = gain.reshape(len(clips), -1).argmax(axis=1)
+        some = np.flatnonzero(gain.reshape(len(clips), -1)[np.arange(len(clips)), pair] > 0)
+        if not len(some):
+            return [_axes(each, alive[n], sets[n] > 0) for n, each in enumerate(clips)]
+        a, b = np.divmod(pair[some], most)
+        for n, i, j in zip(some.tolist(), a.tolist(), b.tolist(), strict=True):
+            clips[n].members[i] = clips[n].members[i] + clips[n].members[j]
+        merged = np.maximum(sets[some, a], sets[some, b])
+        sets[some, a] = merged
+        width[some, a] += width[some, b]
+        alive[some, b] = False
+        count[some, a] = size = merged.sum(axis=1)
+        cost[some, a] = price = axis_bytes + size * (time_bytes + width[some, a])
+        union = size[:, None] + count[some] - (sets[some] @ merged[:, :, None])[..., 0]
+        row = price[:, None] + cost[some] - axis_bytes - union * (time_bytes + width[some, a][:, None] + width[some])
+        row[~alive[some]] = -np.inf
+        row[np.arange(len(some)), a] = -np.inf
+        gain[some, a] = row
+        gain[some, :, a] = row
+        gain[some, b] = -np.inf
+        gain[some, :, b] = -np.inf
+
+
+def _axes(groups: _Groups, alive: Bools, keys: Bools) -> list[SharedAxis]:
+    length = groups.keys.shape[1]
+    return [
+        SharedAxis(keys[n, :length], tuple(groups.members[n])) for n in np.flatnonzero(alive[: len(groups)]).tolist()
+    ]
 
 
 class TimeAxisSearch:
@@ -85,72 +141,111 @@ class TimeAxisSearch:
         self._segments = SegmentErrors(self._scaled[self._tabled], source.grid, MAX_BUDGET_PER_BOUND * bound)
         self._rows: dict[tuple[int, float], Bools] = {}
 
-    def axes(self, name: str, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-        """Return the axes of the tracks `keyed` under their budgets (G,) in metres, by the layout `name`."""
-        return LAYOUTS[name](self, keyed, budgets) if len(keyed) else []
-
     def scaled(self, keyed: Ints, budgets: Floats) -> Floats:
         """Return the values of tracks on the grid (k, K, 4) in units of their budgets."""
         return np.asarray(self._scaled[keyed] / budgets[keyed][:, None, None])
 
-    def greedy_keys(self, keyed: Ints, budgets: Floats) -> Bools:
-        """Return the keys (k, K) that each track requires by itself."""
-        names = [(i, float(budgets[i])) for i in keyed.tolist()]
-        new = [k for k, name in enumerate(names) if name not in self._rows]
-        if new:
-            found = self._search(keyed[new], budgets)
-            self._rows.update((names[k], row) for k, row in zip(new, found, strict=True))
-        return np.array([self._rows[name] for name in names])
+    def known_keys(self, keyed: Ints, budgets: Floats) -> Bools:
+        """Return the keys (k, K) that each track requires by itself, found by `find_keys`."""
+        return np.array([self._rows[i, float(budgets[i])] for i in keyed.tolist()])
 
-    def _search(self, keyed: Ints, budgets: Floats) -> Bools:
-        """The same without the cache: from the table for the tracks in it, else by a new search."""
-        rows = np.searchsorted(self._tabled, keyed)
-        there = self._is_tabled[keyed]
-        found = np.zeros((len(keyed), len(self.grid)), np.bool_)
-        if there.any():
-            found[there] = self._segments.greedy_keys(rows[there], budgets[keyed[there]])
-        if not there.all():
-            found[~there] = greedy_keys(self.scaled(keyed[~there], budgets), self.grid)
-        return found
+    def new_tracks(self, keyed: Ints, budgets: Floats) -> Ints:
+        """Return the tracks whose keys under their budgets are not known yet."""
+        return np.array([i for i in keyed.tolist() if (i, float(budgets[i])) not in self._rows], np.int64)
 
-    def merge(self, keyed: Ints, keep: Bools) -> list[SharedAxis]:
-        """Return the axes of fewest bytes for tracks that require the keys `keep` (k, K)."""
-        prices, width = self.coding.byte_costs, self.key_bytes[keyed]
-        axes = merge_axes(keep, width, axis_bytes=prices.axis, time_bytes=self.coding.time_bytes)
-        return [SharedAxis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+    def from_table(self, tracks: Ints, budgets: Floats) -> tuple[Ints, tuple[SegmentErrors, Ints, Floats]]:
+        """Return those of some tracks that are in the table, with what `segment_errors.greedy_keys` takes for them."""
+        there = tracks[self._is_tabled[tracks]]
+        return there, (self._segments, np.searchsorted(self._tabled, there), budgets[there])
+
+    def search_others(self, tracks: Ints, budgets: Floats) -> None:
+        """Find the keys of those of some tracks that are in no table."""
+        others = tracks[~self._is_tabled[tracks]]
+        if len(others):
+            self.add(others, budgets, greedy_keys(self.scaled(others, budgets), self.grid))
+
+    def add(self, tracks: Ints, budgets: Floats, keys: Bools) -> None:
+        """Cache the keys (k, K) of tracks under their budgets."""
+        self._rows.update(((i, float(budgets[i])), row) for i, row in zip(tracks.tolist(), keys, strict=True))
 
 
-def _merge_by_bytes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-    return layouts.merge(keyed, layouts.greedy_keys(keyed, budgets))
+def find_axes(name: str, asked: Sequence[Asked]) -> list[list[SharedAxis]]:
+    """Return the time axes of tracks of several clips, each of its own, by the layout `name`."""
+    some = [each for each in asked if len(each[1])]
+    found = iter(LAYOUTS[name](some) if some else [])
+    return [next(found) if len(keyed) else [] for _, keyed, _ in asked]
 
 
-def _source_key_axes(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
+def find_keys(asked: Sequence[Asked]) -> None:
+    """Find the keys that tracks of several clips require by themselves, those that are not known yet."""
+    searches = []
+    for layouts, keyed, budgets in asked:
+        new = layouts.new_tracks(keyed, budgets)
+        layouts.search_others(new, budgets)
+        there, table = layouts.from_table(new, budgets)
+        if len(there):
+            searches.append((layouts, there, budgets, table))
+    found = segment_errors.greedy_keys([table for *_, table in searches])
+    for (layouts, there, budgets, _), keys in zip(searches, found, strict=True):
+        layouts.add(there, budgets, keys)
+
+
+def _merge_by_bytes(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
+    find_keys(asked)
+    return _merge([(layouts, keyed, layouts.known_keys(keyed, budgets)) for layouts, keyed, budgets in asked])
+
+
+def _merge(asked: Sequence[tuple[TimeAxisSearch, Ints, Bools]]) -> list[list[SharedAxis]]:
+    """The axes of fewest bytes for the tracks `keyed` (k,) of each clip, which require the keys `keep` (k, K)."""
+    coding = asked[0][0].coding
+    merged = merge_axes(
+        [(keep, layouts.key_bytes[keyed]) for layouts, keyed, keep in asked],
+        axis_bytes=coding.byte_costs.axis,
+        time_bytes=coding.time_bytes,
+    )
+    return [
+        [SharedAxis(axis.keys, tuple(keyed[list(axis.members)].tolist())) for axis in axes]
+        for axes, (_, keyed, _) in zip(merged, asked, strict=True)
+    ]
+
+
+def _source_key_axes(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
     """Axes of source keys only: players with component-wise interpolation then deviate like the source."""
+    return [_of_source_keys(*each) for each in asked]
+
+
+def _of_source_keys(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
     kinds, kind = np.unique(layouts.own[keyed], axis=0, return_inverse=True)
     axes = []
     for number, mask in enumerate(kinds):
         members = keyed[kind.reshape(-1) == number]
         keep = np.zeros((len(members), len(mask)), np.bool_)
         keep[:, mask] = greedy_keys(layouts.scaled(members, budgets)[:, mask], layouts.grid[mask])
-        axes += layouts.merge(members, keep)
+        axes += _merge([(layouts, members, keep)])[0]
     return axes
 
 
-def _one_axis(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-    keys = joint_greedy_keys(layouts.scaled(keyed, budgets), layouts.grid)
-    return [SharedAxis(keys, tuple(keyed.tolist()))]
+def _one_axis(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
+    return [
+        [SharedAxis(joint_greedy_keys(layouts.scaled(keyed, budgets), layouts.grid), tuple(keyed.tolist()))]
+        for layouts, keyed, budgets in asked
+    ]
 
 
 def _even_axis(nth: int) -> Layout:
-    def layout(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-        keys = np.zeros(len(layouts.grid), np.bool_)
-        keys[::nth] = keys[-1] = True
-        return [SharedAxis(keys, tuple(keyed.tolist()))]
+    def layout(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
+        axes = []
+        for layouts, keyed, _ in asked:
+            keys = np.zeros(len(layouts.grid), np.bool_)
+            keys[::nth] = keys[-1] = True
+            axes.append([SharedAxis(keys, tuple(keyed.tolist()))])
+        return axes
 
     return layout
 
 
-Layout: TypeAlias = Callable[[TimeAxisSearch, Ints, Floats], list[SharedAxis]]
+Asked: TypeAlias = tuple[TimeAxisSearch, Ints, Floats]  # tracks `keyed` (k,) of a clip, and the budgets (G,) in metres
+Layout: TypeAlias = Callable[[Sequence[Asked]], list[list[SharedAxis]]]
 
 LAYOUTS: dict[str, Layout] = {
     "merged": _merge_by_bytes,

@@ -165,6 +165,33 @@ def encode_all(values: Sequence[Floats], forms: Sequence[Form]) -> list[EncodedK
     return [found[i] if i in found else encode(values[i], forms[i]) for i in range(len(forms))]
 
 
+def encode_stack(
+    keys: Floats, counts: Sequence[int], paths: Sequence[str], tolerances: Sequence[float], packing: Packing
+) -> tuple[list[EncodedKeys], Floats]:
+    """Return the keys of each track, and their values (C, T, K), in the smallest formats within the tolerances.
+
+    keys: (C, T, K), component, track and key. counts: (T,) of each track's keys. paths, tolerances: (T,), as of
+    `choose_format`.
+    """
+    if packing is not Packing.CORE:
+        values = [keys[:, t, :count].T for t, count in enumerate(counts)]
+        forms = [choose_format(*each, packing) for each in zip(values, paths, tolerances, strict=True)]
+        stored = encode_all(values, forms)
+        decoded = keys.copy()
+        for t, (count, each) in enumerate(zip(counts, stored, strict=True)):
+            decoded[:, t, :count] = each.values.T
+            decoded[:, t, count:] = each.values[-1, :, None]
+        return stored, decoded
+    integers = [is_int16(*each) for each in zip(paths, tolerances, counts, strict=True)]
+    decoded = keys.astype(np.float32).astype(np.float64)
+    some = np.flatnonzero(integers)
+    decoded[:, some] = np.rint(keys[:, some] * MAX_INT16) / MAX_INT16
+    by_track = np.ascontiguousarray(np.moveaxis(decoded, 0, 2))
+    names = ["int16" if each else "float32" for each in integers]
+    stored = [EncodedKeys(by_track[t, : counts[t]], name) for t, name in enumerate(names)]
+    return stored, decoded
+
+
 def constant_cost(value: Floats) -> EncodedKeys:
     """Return a single key (1, C) at `value` (C,), in float32, whose JSON is shorter than that of integers."""
     return EncodedKeys(value[None].astype(np.float32).astype(np.float64), "float32")

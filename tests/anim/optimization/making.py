@@ -9,17 +9,22 @@ import numpy as np
 from anim.arrays import Floats
 from anim.measure.error.point_matrix import PointMatrix, sample_points
 from anim.model import Clip, Scene
+from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
 from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.context import Context, build_context
+from anim.optimization.search.lockstep import Found, search_clips
+from anim.optimization.search.plan import Solution
 from anim.optimization.search.source_motion import SourceMotion, analyze_source
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from tests.anim.skinning.scenes import random_scene
-from tests.clips import clip, track
+from tests.clips import about, clip, track
 
 CORE = Encoding(Packing.CORE, BYTE_COSTS[Objective.FILE])
 JOINTS = 5
 TIMES = np.linspace(0, 2, 25)  # s
+SHORT_TIMES = np.arange(9) / 16  # s
+LATE_TIMES = np.arange(43) / 16 + 0.5  # s
 
 
 def scene(seed: int = 1, **more: float) -> Scene:
@@ -35,17 +40,59 @@ def turning(amount: float, axis: Sequence[float] = (0, 0, 1), times: Floats = TI
     return np.concatenate((np.sin(half)[:, None] * direction, np.cos(half)[:, None]), axis=1)
 
 
-def waving(name: str = "wave") -> Clip:
+def waving(name: str = "wave", times: Floats = TIMES) -> Clip:
     """A clip in which joints 1 and 2 turn and the root sways; joint 3 is held where it rests, joint 4 elsewhere."""
-    sway = np.stack((np.sin(3 * TIMES), 0 * TIMES, np.cos(TIMES)), axis=1)
+    sway = np.stack((np.sin(3 * times), 0 * times, np.cos(times)), axis=1)
     return clip(
-        track("translation", TIMES, sway, node=0),
-        track("rotation", TIMES, turning(1.5), node=1),
-        track("rotation", TIMES, turning(-0.8, (1, 2, 0)), node=2),
-        track("scale", TIMES, np.ones((25, 3)), node=3),
-        track("scale", TIMES, np.full((25, 3), 0.75), node=4),
+        track("translation", times, sway, node=0),
+        track("rotation", times, turning(1.5, times=times), node=1),
+        track("rotation", times, turning(-0.8, (1, 2, 0), times), node=2),
+        track("scale", times, np.ones((len(times), 3)), node=3),
+        track("scale", times, np.full((len(times), 3), 0.75), node=4),
         name=name,
     )
+
+
+def nodding(name: str = "nod", times: Floats = SHORT_TIMES) -> Clip:
+    """A clip of other tracks: joint 3 turns and grows, joint 1 turns too, in fewer keys and without coming back."""
+    there = times / times[-1]
+    return clip(
+        track("rotation", times, about("x", 70 * there**2), node=3),
+        track("scale", times, 1 + np.outer(np.sin(4 * there), [0.1, 0.2, 0.1]), node=3),
+        track("rotation", times[::2], about("y", 40 * np.cos(5 * there[::2])), node=1),
+        name=name,
+    )
+
+
+def stepping(name: str = "step", times: Floats = LATE_TIMES) -> Clip:
+    """A longer clip, which starts later: the root turns, joint 2 moves, joint 4 turns noisily."""
+    noise = np.random.default_rng(5).normal(0, 3, len(times))
+    path = np.stack((times, np.abs(np.sin(4 * times)), 0 * times), axis=1)
+    return clip(
+        track("rotation", times, about("y", 60 * np.sin(times)), node=0),
+        track("translation", times, 0.3 * path, node=2),
+        track("rotation", times, about("z", 20 * np.sin(6 * times) + noise), node=4),
+        name=name,
+    )
+
+
+def task_of(what: Clip, bound: float, *, unused: bool = False) -> Task:
+    """A clip to optimize, without constants of other clips."""
+    count = len(what.tracks)
+    return Task(what, ((),) * count, (unused,) * count, bound)
+
+
+def solved(context: Context, task: Task) -> Solution | None:
+    """The solution of a clip by itself: each of its searches is run alone."""
+    steps = solve(context, task)
+    answer: Found | None = None
+    while True:
+        try:
+            request = steps.send(answer)
+        except StopIteration as end:
+            solution: Solution | None = end.value
+            return solution
+        (answer,) = search_clips(context, [request], context.effort)
 
 
 def every_point(of: Scene) -> PointMatrix:
@@ -54,12 +101,17 @@ def every_point(of: Scene) -> PointMatrix:
     return sample_points(of, frozenset(), 0.01, frozenset((0, v) for v in range(count)))
 
 
-def truth_of(of: Scene, what: Clip, points: PointMatrix, reference: Reference = Reference.CURVE) -> SourceMotion:
-    """What a clip does to points, all of its tracks free."""
+def truth_of(
+    of: Scene,
+    what: Clip,
+    points: PointMatrix,
+    reference: Reference = Reference.CURVE,
+    free: Sequence[int] | None = None,
+) -> SourceMotion:
+    """What a clip does to points. free: indices of the tracks that may change; all by default."""
     below = AnsweringPoints(points, of.skeleton.parents)
-    return analyze_source(
-        of.skeleton, what, range(len(what.tracks)), points, below, reference=reference, chord_tolerance=1e-6
-    )
+    free = range(len(what.tracks)) if free is None else free
+    return analyze_source(of.skeleton, what, free, points, below, reference=reference, chord_tolerance=1e-6)
 
 
 def setting_of(
@@ -70,12 +122,13 @@ def setting_of(
     policy: Policy | None = None,
     effort: str = "fast",
     packing: Packing = Packing.CORE,
+    bounds: Bounds | None = None,
 ) -> Context:
     """The setting for clips of a scene."""
     return build_context(
         of,
         tuple(clips),
-        bounds=Bounds(max_error, 0.02),
+        bounds=bounds or Bounds(max_error, 0.02),
         policy=policy or Policy(),
         coding=Encoding(packing, BYTE_COSTS[Objective.FILE]),
         effort=EFFORTS[effort],

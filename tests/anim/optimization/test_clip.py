@@ -12,12 +12,11 @@ import pytest
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
-from anim.optimization.clip import Task, solve
 from anim.optimization.options import Drop, Packing, Policy
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.key_reduction import INT16
 from anim.sampling.track import sample
-from tests.anim.optimization.making import TIMES, scene, setting_of, turning, waving
+from tests.anim.optimization.making import TIMES, scene, setting_of, solved, task_of, turning, waving
 from tests.clips import CUBICSPLINE, LINEAR, STEP, about, clip, track
 
 OF = scene()
@@ -34,8 +33,7 @@ def _solved(
     of: Scene = OF,
 ) -> Solution:
     context = setting_of(of, [what], max_error=max_error, policy=policy, packing=packing)
-    count = len(what.tracks)
-    found = solve(context, Task(what, ((),) * count, (unused,) * count, max_error))
+    found = solved(context, task_of(what, max_error, unused=unused))
     assert found is not None
     assert (found.clip.name, found.clip.start, found.clip.end) == (what.name, what.start, what.end)
     assert len(found.stored) == len(found.clip.tracks) >= 1
@@ -168,7 +166,7 @@ def test_turns_far_from_unit_length_are_left_alone() -> None:
 def test_nothing_is_found_below_float32() -> None:
     what = waving()
     context = setting_of(OF, [what], max_error=1e-13)
-    assert solve(context, Task(what, ((),) * 5, (False,) * 5, 1e-13)) is None
+    assert solved(context, task_of(what, 1e-13)) is None
 
 
 def test_pointers_go_along() -> None:

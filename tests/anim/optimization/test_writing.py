@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from anim.gltf.reading import reader
-from anim.optimization.clip import Task, solve
 from anim.optimization.options import Packing
 from anim.optimization.search.plan import Solution
 from anim.optimization.writing import changed_clips, write_solutions
-from tests.anim.optimization.making import setting_of
+from tests.anim.optimization.making import setting_of, solved, task_of
 from tests.files import glb_of, opened, opened_fixture
 
 
@@ -22,7 +21,7 @@ def _solutions(name: str, packing: Packing) -> dict[int, Solution]:
     context = setting_of(reader.scene(document), clips, packing=packing)
     solutions = {}
     for i, clip in enumerate(clips):
-        found = solve(context, Task(clip, ((),) * len(clip.tracks), (False,) * len(clip.tracks), 1e-3))
+        found = solved(context, task_of(clip, 1e-3))
         assert found is not None
         solutions[i] = found
     return solutions

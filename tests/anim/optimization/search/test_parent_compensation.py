@@ -11,9 +11,10 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Scene
 from anim.optimization.options import Packing
-from anim.optimization.search.candidates import Candidates
+from anim.optimization.search.keyed_tracks import KeyedTracks
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
 from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.time_axes import SharedAxis
 from tests.anim.optimization.making import TIMES, truth_of, turning
 from tests.clips import clip, skeleton, track
@@ -23,11 +24,24 @@ ARM = Scene(skeleton([-1, 0, 1, 2], translation=[[0, 0, 0], [1, 0, 0], [1, 0, 0]
 TIP = PointMatrix(np.array([3]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
 BENDS = clip(*(track("rotation", TIMES, turning(0.6 + 0.2 * i, (0.2 * i, 1, i)), node=i) for i in range(4)))
 EVERY_KEY = np.ones(len(TIMES), np.bool_)
-COARSE = [2e-2] * 4
+COARSE = np.full(4, 2e-2)
+ONE = np.array([0])
 
 
 def _truth() -> SourceMotion:
     return truth_of(ARM, BENDS, TIP)
+
+
+def _stacked(*sources: SourceMotion) -> StackedClips:
+    return StackedClips(ARM.skeleton, sources, TIP)
+
+
+def _shown_by_node(clips: StackedClips, shown: Floats, clip: int) -> Floats:
+    """Rotations (4, M, W) of nodes with tracks as those of all nodes (N, W', 4), without repeated times."""
+    source = clips.sources[clip]
+    rotation = source.local[1].copy()
+    rotation[clips.moving] = np.moveaxis(shown, 0, 2)[:, : len(source.at)]
+    return rotation
 
 
 def _directions(rotation: Floats) -> Rotation:
@@ -40,15 +54,16 @@ def _directions(rotation: Floats) -> Rotation:
 
 def _shown(source: SourceMotion, keys: Bools) -> tuple[Floats, Floats]:
     """What all rotations show, stored coarsely: each for itself, and aiming at the world."""
-    axis = SharedAxis(keys, (0, 1, 2, 3))
-    candidates = Candidates(source, Packing.EXT)
-    local, aimed = source.local[1].copy(), source.local[1].copy()
-    for i, each in candidates.of(axis, COARSE):
-        local[source.moving[i].node] = each.shown
-    found = dict(ParentCompensation(ARM.skeleton, source, candidates).follow([axis], COARSE, aimed))
-    assert sorted(found) == [0, 1, 2, 3]
-    assert all((aimed[source.moving[i].node] == each.shown).all() for i, each in found.items())
-    return local, aimed
+    clips = _stacked(source)
+    keyed = KeyedTracks(clips, Packing.EXT)
+    axes = keyed.on([(0, [SharedAxis(keys, (0, 1, 2, 3))])])
+    local, aimed = clips.local[1].copy(), clips.local[1].copy()
+    for made in keyed.rotations(axes, COARSE):
+        local[:, clips.row[made.tracks], 0] = made.shown
+    found = list(ParentCompensation(ARM.skeleton, clips, keyed).follow(axes, COARSE, aimed, ONE))
+    assert sorted(i for made in found for i in made.tracks.tolist()) == [0, 1, 2, 3]
+    assert all((aimed[:, clips.row[made.tracks], 0] == made.shown).all() for made in found)
+    return _shown_by_node(clips, local[:, :, 0], 0), _shown_by_node(clips, aimed[:, :, 0], 0)
 
 
 @pytest.mark.parametrize("keys", [EVERY_KEY, np.arange(25) % 4 == 0])
@@ -70,13 +85,14 @@ def test_roots_are_as_they_were() -> None:
 def test_tracks_on_no_axis_are_made_up_for() -> None:
     """Joint 1 is held straight: joint 2 turns for both."""
     source = _truth()
-    axis = SharedAxis(EVERY_KEY, (0, 2, 3))
-    shown = source.local[1].copy()
-    shown[1] = [0, 0, 0, 1]
-    for _ in ParentCompensation(ARM.skeleton, source, Candidates(source, Packing.CORE)).follow(
-        [axis], [0.0] * 4, shown
-    ):
+    clips = _stacked(source)
+    keyed = KeyedTracks(clips, Packing.CORE)
+    axes = keyed.on([(0, [SharedAxis(EVERY_KEY, (0, 2, 3))])])
+    rotation = clips.local[1].copy()
+    rotation[:, 1] = np.array([0.0, 0, 0, 1])[:, None, None]
+    for _ in ParentCompensation(ARM.skeleton, clips, keyed).follow(axes, np.zeros(4), rotation, ONE):
         pass
+    shown = _shown_by_node(clips, rotation[:, :, 0], 0)
     off = _directions(shown[:3]) * _directions(source.local[1][:3]).inv()
     assert off.magnitude()[source.on_grid].max() < 1e-5
 
@@ -108,13 +124,52 @@ def test_nodes_below_the_last_rotation_track_take_no_time(monkeypatch: pytest.Mo
     sizes: list[int] = []
 
     def called(a: Floats, b: Floats) -> Floats:
-        sizes.append(len(b))
+        sizes.append(a.shape[0])
         return multiply(a, b)
 
     multiply = quaternion.multiply
     monkeypatch.setattr(quaternion, "multiply", called)
-    compensation = ParentCompensation(chain.skeleton, source, Candidates(source, Packing.CORE))
+    clips = StackedClips(chain.skeleton, [source], tip)
+    keyed = KeyedTracks(clips, Packing.CORE)
+    compensation = ParentCompensation(chain.skeleton, clips, keyed)
     assert sizes == [1, 1]
-    found = dict(compensation.follow([SharedAxis(EVERY_KEY, (0,))], [1e-3], source.local[1].copy()))
-    assert list(found) == [0]
+    axes = keyed.on([(0, [SharedAxis(EVERY_KEY, (0,))])])
+    (found,) = compensation.follow(axes, np.array([1e-3]), clips.local[1].copy(), ONE)
+    assert found.tracks.tolist() == [0]
     assert len(sizes) <= 6
+
+
+@pytest.mark.parametrize("packing", [Packing.CORE, Packing.EXT])
+def test_clips_together_have_the_keys_of_each_alone(packing: Packing) -> None:
+    """Clips of other lengths and other tracks, one of them not asked for, and one with a track on no axis."""
+    short = np.linspace(0, 0.7, 8)
+    others = (
+        clip(*(track("rotation", short, turning(0.9, (1, i, 0), short), node=i) for i in (3, 1))),
+        clip(track("rotation", np.linspace(0, 3, 40), turning(1.2, times=np.linspace(0, 3, 40)), node=2)),
+    )
+    what = (BENDS, *others)
+    masks = [np.ones(len(truth_of(ARM, each, TIP).grid), np.bool_) for each in what]
+    masks[0][1::2] = False
+    members = ((0, 1, 3), (0, 1), (0,))
+    clips = _stacked(*(truth_of(ARM, each, TIP) for each in what))
+    keyed = KeyedTracks(clips, packing)
+    axes = keyed.on([(b, [SharedAxis(masks[b], members[b])]) for b in (0, 1)])
+    some, tolerances = np.array([0, 1]), np.full(len(clips.clip), 1e-2)
+    shown = np.take(clips.local[1], some, axis=2)
+    follow = ParentCompensation(ARM.skeleton, clips, keyed).follow
+    stored = {
+        i: keys
+        for made in follow(axes, tolerances, shown, some)
+        for i, keys in zip(made.tracks.tolist(), made.stored, strict=True)
+    }
+    assert sorted(stored) == [0, 1, 3, 4, 5]
+    for b in (0, 1):
+        alone = _stacked(truth_of(ARM, what[b], TIP))
+        own = KeyedTracks(alone, packing)
+        rotation = alone.local[1].copy()
+        there = own.on([(0, [SharedAxis(masks[b], members[b])])])
+        for made in ParentCompensation(ARM.skeleton, alone, own).follow(there, tolerances, rotation, ONE):
+            for i, keys in zip(made.tracks.tolist(), made.stored, strict=True):
+                np.testing.assert_array_equal(stored[int(clips.first_track[b]) + i].values, keys.values)
+        expected = _shown_by_node(alone, rotation[:, :, 0], 0)
+        assert _shown_by_node(clips, shown[:, :, b], b) == pytest.approx(expected, abs=1e-12)

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from anim.optimization.options import EFFORTS, Bounds
-from anim.optimization.search.plan import TrackAction
+from anim.optimization.options import EFFORTS
+from anim.optimization.search.lockstep import run_searches
+from anim.optimization.search.plan import TrackAction, TrialResult
 from anim.optimization.search.search import search
-from anim.optimization.search.trial import BoundUsage, TrialRunner
-from tests.anim.optimization.making import CORE, every_point, scene, truth_of, waving
-
-OF = scene()
+from tests.anim.optimization.making import waving
+from tests.anim.optimization.search.stacks import bench
 
 
-def _bench(bound: float) -> TrialRunner:
-    points = every_point(OF)
-    source = truth_of(OF, waving(), points)
-    count = len(source.moving)
-    allowed = np.full(len(points), bound)
-    usage = BoundUsage(OF.skeleton, source, allowed, Bounds(bound, 0.0))
-    return TrialRunner(OF.skeleton, source, usage, CORE, np.ones(count, bool), [()] * count)
+def _found(bound: float, effort: str) -> TrialResult | None:
+    made = bench(waving(), bound=bound)
+    steps = search(made.sources[0], bound, EFFORTS[effort], lambda: made.batch.leeway(0))
+    (found,) = run_searches(made.batch, [steps])
+    return found
 
 
 def test_more_effort_and_more_room_take_fewer_bytes() -> None:
     sizes = {}
     for bound in (1e-3, 3e-2, 3e-1):
         for name in ("fast", "balanced"):
-            found = search(_bench(bound), bound, EFFORTS[name])
+            found = _found(bound, name)
             assert found is not None
             assert found.worst <= 1
             sizes[bound, name] = found.size
@@ -36,14 +32,14 @@ def test_more_effort_and_more_room_take_fewer_bytes() -> None:
 
 
 def test_the_bound_is_used() -> None:
-    found = search(_bench(0.1), 0.1, EFFORTS["balanced"])
+    found = _found(0.1, "balanced")
     assert found is not None
     assert found.worst > 0.9
 
 
 @pytest.mark.parametrize("effort", ["fast", "balanced"])
 def test_the_same_every_time(effort: str) -> None:
-    first, again = (search(_bench(5e-3), 5e-3, EFFORTS[effort]) for _ in range(2))
+    first, again = (_found(5e-3, effort) for _ in range(2))
     assert first is not None
     assert again is not None
     assert first.size == again.size
@@ -51,10 +47,10 @@ def test_the_same_every_time(effort: str) -> None:
 
 
 def test_everything_goes_under_a_bound_that_allows_it() -> None:
-    found = search(_bench(100.0), 100.0, EFFORTS["fast"])
+    found = _found(100.0, "fast")
     assert found is not None
     assert (found.actions == TrackAction.DROPPED).all()
 
 
 def test_none_where_float32_itself_is_too_coarse() -> None:
-    assert search(_bench(1e-13), 1e-13, EFFORTS["fast"]) is None
+    assert _found(1e-13, "fast") is None

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.point_matrix import PointMatrix, stack_points
 from anim.model import Scene
 from anim.optimization.options import Reference
 from anim.optimization.search.playback import level_world_matrices, required_levels
@@ -67,23 +65,15 @@ def test_worlds_are_products_of_matrices_with_turns_as_stored() -> None:
             assert found[node, frame] == pytest.approx(_chained(of, node, local, frame)[:3], abs=1e-9)
 
 
-def test_columns_are_the_sampled_pose() -> None:
+def test_worlds_are_the_sampled_pose() -> None:
+    """Of nodes that carry points, and of all above them."""
     of, what = scene(), waving()
     points = every_point(of)
     source = truth_of(of, what, points)
     assert (source.at[source.on_grid] == source.grid).all()
     expected = world_matrices(of.skeleton, sample_pose(of.skeleton, what, source.at)).swapaxes(0, 1)
-    assert source.columns == pytest.approx(stack_points(expected, source.points.nodes), abs=1e-12)
-
-
-def test_points_of_nodes_that_move_with_their_parents_are_on_those() -> None:
-    of = scene(scale_shear=0.3)
-    what = clip(track("rotation", [0, 1, 2], about("y", [0, 60, 90]), node=1))
-    points = every_point(of)
-    source = truth_of(of, what, points)
-    assert set(source.points.nodes.tolist()) <= {0, 1} < set(points.nodes.tolist())
-    world = world_matrices(of.skeleton, sample_pose(of.skeleton, what, source.at)).swapaxes(0, 1)
-    assert source.points.places(world) == pytest.approx(points.places(world), abs=1e-9)
+    needed = np.concatenate(required_levels(of.skeleton, points.nodes))
+    assert source.world[needed] == pytest.approx(expected[needed], abs=1e-12)
 
 
 def test_keys_only() -> None:
@@ -116,7 +106,8 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
     points = every_point(of)
     source = truth_of(of, what, points)
     rng = np.random.default_rng(seed)
-    before = source.points.places(level_world_matrices(of.skeleton, source.local, source.levels))
+    levels = required_levels(of.skeleton, points.nodes)
+    before = points.places(level_world_matrices(of.skeleton, source.local, levels))
     for each in source.moving:
         local = tuple(part.copy() for part in source.local)
         change = 1e-4 * rng.normal(size=each.values.shape)
@@ -125,37 +116,23 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
             changed = quaternion.normalize(changed)
             change = changed - each.values
         local[PATHS.index(each.path)][each.node] = changed
-        after = source.points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), source.levels))
+        after = points.places(level_world_matrices(of.skeleton, (local[0], local[1], local[2]), levels))
         moved = np.linalg.norm(after - before, axis=2)
         allowed = each.meters * np.linalg.norm(change, axis=1).max()
         assert moved[source.answering.of(each.node)].max(initial=0.0) <= slack * allowed
         assert moved.max() > 0.05 * allowed  # and it says no more than it must
 
 
-def test_chords_count_only_where_they_leave_the_arc() -> None:
+def test_chords_are_asked_for_where_they_leave_the_arc() -> None:
     of = scene()
     points = every_point(of)
-
-    def both(*tracks: Floats) -> bool:
-        times = np.linspace(0, 2, len(tracks[0]))
-        source = truth_of(of, clip(track("rotation", times, tracks[0], node=1)), points)
-        return source.by_chord is not source.columns
-
-    assert not both(turning(0.2))
-    assert both(about("z", [0, 90]))
-
-
-def test_chords_are_normalized_mixes() -> None:
-    """A point at x = 1, a quarter of the way through 120° in one step."""
-    of = Scene(skeleton([-1]), ())
-    points = PointMatrix(np.array([0]), np.array([[0]]), np.array([[[1.0, 0, 0, 1]]]))
-    rotation = track("rotation", [0, 1], about("z", [0, 120]))
-    quarters = track("scale", [0, 0.25, 1], np.ones((3, 3)))
-    source = truth_of(of, clip(rotation, quarters), points)
-    x_axis = source.by_chord.reshape(4, 3, -1)[0].T
-    quarter = int(np.searchsorted(source.at, 0.25))
-    mix = 0.75 * about("z", 0) + 0.25 * about("z", 120)
-    assert source.at[quarter] == 0.25
-    assert x_axis[quarter] == pytest.approx(Rotation.from_quat(mix).as_matrix()[:, 0])
-    along_arc = source.columns.reshape(4, 3, -1)[0].T
-    assert along_arc[quarter] == pytest.approx([np.cos(np.radians(30)), 0.5, 0])
+    for rotations, bent in ((turning(0.2), False), (about("z", [0, 90]), True)):
+        times = np.linspace(0, 2, len(rotations))
+        quarters = track("scale", [0, 0.5, 2], np.ones((3, 3)))
+        source = truth_of(of, clip(track("rotation", times, rotations, node=1), quarters), points)
+        assert (source.chords is not None) is bent
+        if source.chords is not None:
+            mixed = np.stack([np.interp(source.at, times, column) for column in rotations.T], axis=1)
+            mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
+            assert source.chords[1] == pytest.approx(mixed, abs=1e-12)
+            assert np.abs(source.chords[1] - source.local[1][1]).max() > 0.001

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from anim.arrays import Bools, Floats
+from anim.optimization.search import time_axes
 from anim.optimization.search.time_axes import SharedAxis, merge_axes
+from tests.calls import count_calls
 
 AXIS, TIME = 120.0, 4.0
 
@@ -41,7 +43,8 @@ def _random(seed: int, tracks: int, keys: int = 40) -> tuple[Bools, Floats]:
 
 
 def _merged(keep: Bools, key_bytes: Floats) -> list[SharedAxis]:
-    return merge_axes(keep, key_bytes, axis_bytes=AXIS, time_bytes=TIME)
+    (axes,) = merge_axes([(keep, key_bytes)], axis_bytes=AXIS, time_bytes=TIME)
+    return axes
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -73,6 +76,50 @@ def test_near_the_best_of_all_ways(seed: int) -> None:
     assert best <= cost <= 1.05 * best
 
 
+def _plain(keep: Bools, key_bytes: Floats) -> list[list[int]]:
+    """Groups of tracks, by loops: the pair that saves most is merged, the first of equal ones."""
+    groups: list[list[int]] = []
+    for i in range(len(keep)):
+        equal = next((group for group in groups if (keep[group[0]] == keep[i]).all()), None)
+        groups.append([i]) if equal is None else equal.append(i)
+    while True:
+        cost = _cost(keep, key_bytes, groups)
+        tried = [
+            (cost - _cost(keep, key_bytes, [*groups[:a], groups[a] + groups[b], *groups[a + 1 : b], *groups[b + 1 :]]),
+             -a, -b)
+            for b in range(len(groups)) for a in range(b)
+        ]  # fmt: skip
+        saved, a, b = max(tried, default=(0.0, 0, 0))
+        if saved <= 0:
+            return groups
+        groups[-a] = groups[-a] + groups.pop(-b)
+
+
+def _several() -> list[tuple[Bools, Floats]]:
+    return [_random(seed, tracks, keys) for seed, (tracks, keys) in enumerate([(9, 40), (1, 7), (30, 60), (4, 200)])]
+
+
+def test_axes_are_those_of_a_plain_loop() -> None:
+    for keep, key_bytes in (*_several()[:2], _random(5, 12, 30), _random(6, 12, 90)):
+        assert [list(axis.members) for axis in _merged(keep, key_bytes)] == _plain(keep, key_bytes)
+
+
+@pytest.mark.parametrize(("pairs", "calls"), [(1, 4), (170, 3), (time_axes.MAX_STACKED_PAIRS, 1)])
+def test_axes_of_clips_together_are_those_of_each_alone(
+    pairs: int, calls: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also in parts, where all together would take too much memory."""
+    alone = [_merged(*each) for each in _several()]
+    assert any(1 < len(axes) < 30 for axes in alone)
+    monkeypatch.setattr(time_axes, "MAX_STACKED_PAIRS", pairs)
+    counted = count_calls(monkeypatch, time_axes, "_merge_groups")
+    together = merge_axes(_several(), axis_bytes=AXIS, time_bytes=TIME)
+    assert len(counted) == calls
+    for some, axes in zip(together, alone, strict=True):
+        assert [axis.members for axis in some] == [axis.members for axis in axes]
+        assert all((a.keys == b.keys).all() and a.keys.shape == b.keys.shape for a, b in zip(some, axes, strict=True))
+
+
 def test_two_tracks_merge_just_where_it_pays() -> None:
     """Sharing saves an axis, 120 bytes, and a time per shared key; it costs a value where one has no key."""
     keep = np.zeros((2, 100), np.bool_)
@@ -85,5 +132,5 @@ def test_two_tracks_merge_just_where_it_pays() -> None:
 
 def test_equal_needs_share_whatever_they_cost() -> None:
     keep = np.tile([True, False, True], (4, 1))
-    (axis,) = merge_axes(keep, np.full(4, 1e9), axis_bytes=0.0, time_bytes=0.0)
+    ((axis,),) = merge_axes([(keep, np.full(4, 1e9))], axis_bytes=0.0, time_bytes=0.0)
     assert (axis.members, axis.keys.tolist()) == ((0, 1, 2, 3), [True, False, True])

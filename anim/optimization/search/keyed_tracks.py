@@ -1,0 +1,125 @@
+"""Tracks on their time axes: keys fitted, as stored and as played, of all tracks of a trial at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.optimization.options import Packing
+from anim.optimization.search import playback
+from anim.optimization.search.key_fit import KeyFit
+from anim.optimization.search.key_intervals import KeyIntervals, find_intervals
+from anim.optimization.search.source_motion import ROTATION
+from anim.optimization.search.stacked_clips import StackedClips
+from anim.optimization.search.time_axes import SharedAxis
+from anim.optimization.tracks import quantization
+from anim.optimization.tracks.quantization import EncodedKeys
+
+MAX_STACKED_VALUES = 1 << 18  # tracks × times at a time, each with about 300 bytes of temporary arrays
+
+
+class KeyedAxes(NamedTuple):
+    """The time axes of the trials of some clips. axis_of: (T,), the index of each track's axis, −1 for none."""
+
+    axis_of: Ints
+    intervals: KeyIntervals
+    fit: KeyFit
+
+
+class StoredTracks(NamedTuple):
+    """Tracks of one kind, rotations or vectors, with their stored keys.
+
+    tracks: (T,), indices. stored: per track. keys: (C, T, K), the stored values; after a track's last key any.
+    shown: (C, T, W), played values at the measurement times.
+    """
+
+    tracks: Ints
+    stored: list[EncodedKeys]
+    keys: Floats
+    shown: Floats
+
+
+class KeyedTracks:
+    """Makes the keys of several clips' tracks."""
+
+    def __init__(self, clips: StackedClips, packing: Packing) -> None:
+        self._clips = clips
+        self._packing = packing
+        self._moving = [each for source in clips.sources for each in source.moving]
+        self._closures = np.array([each.closure for each in self._moving])
+        self._grid_sizes = np.array([len(source.grid) for source in clips.sources])[clips.clip]
+
+    def on(self, axes: Sequence[tuple[int, Sequence[SharedAxis]]]) -> KeyedAxes:
+        """Return the axes of some clips, each given with its index, and what all tracks on them share."""
+        clips = self._clips
+        axis_of = np.full(len(self._moving), -1)
+        listed = [(clip, axis) for clip, some in axes for axis in some]
+        keys = np.zeros((len(listed), clips.grid.shape[1]), np.bool_)
+        for number, (clip, axis) in enumerate(listed):
+            axis_of[clips.first_track[clip] + np.array(axis.members)] = number
+            keys[number, : len(axis.keys)] = axis.keys
+        clip_of = np.array([clip for clip, _ in listed], np.int64)
+        intervals = find_intervals(keys, clips, clip_of)
+        return KeyedAxes(axis_of, intervals, KeyFit(intervals, clips.weights[clip_of]))
+
+    def vectors(self, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
+        """Yield all translations and scales on axes. tolerances: (T,) for storage, in units of values."""
+        yield from self._each(np.flatnonzero((axes.axis_of >= 0) & (self._clips.path != ROTATION)), axes, tolerances)
+
+    def rotations(self, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
+        """Yield all rotations on axes. tolerances: (T,) for storage, in units of values."""
+        yield from self._each(np.flatnonzero((axes.axis_of >= 0) & (self._clips.path == ROTATION)), axes, tolerances)
+
+    def store(self, tracks: Ints, values: Floats, axes: KeyedAxes, tolerances: Floats) -> StoredTracks:
+        """Return tracks of one kind on axes, with other values (C, T, W) than their own.
+
+        tolerances: of all tracks.
+        """
+        axis_of = axes.axis_of[tracks]
+        keys = self._fit(tracks, values, axes)
+        counts = axes.intervals.counts[axis_of].tolist()
+        _close_ends(keys, self._closures[tracks], counts)
+        paths = [self._moving[i].path for i in tracks.tolist()]
+        stored, keys = quantization.encode_stack(keys, counts, paths, tolerances[tracks].tolist(), self._packing)
+        play = playback.slerp_raw if len(values) == 4 else playback.lerp
+        shown = play(keys, axes.intervals.left[axis_of], axes.intervals.u[axis_of])
+        return StoredTracks(tracks, stored, keys, shown)
+
+    def _each(self, tracks: Ints, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
+        """Tracks of one kind, so many at a time as memory allows."""
+        count = max(MAX_STACKED_VALUES // self._clips.at.shape[1], 1)
+        for some in (tracks[first : first + count] for first in range(0, len(tracks), count)):
+            values = self._clips.padded([self._moving[i].values for i in some.tolist()])
+            yield self.store(some, values, axes, tolerances)
+
+    def _fit(self, tracks: Ints, values: Floats, axes: KeyedAxes) -> Floats:
+        """Keys (C, T, K) of values (C, T, W): on an axis with every key their own, else a fit."""
+        axis_of = axes.axis_of[tracks]
+        at = axes.intervals.at[axis_of]
+        flat = at + values.shape[2] * np.arange(len(at))[:, None]
+        keys: Floats = np.take(values.reshape(len(values), -1), flat, axis=1)
+        is_full = axes.intervals.counts[axis_of] == self._grid_sizes[tracks]
+        if is_full.all():
+            return keys
+        if len(values) == 4:
+            fitted = axes.fit.rotations(values, keys, axis_of)
+        else:
+            fitted = axes.fit.vectors(values, axis_of)
+        fitted[:, is_full] = keys[:, is_full]
+        return fitted
+
+
+def _close_ends(keys: Floats, signs: Floats, counts: Sequence[int]) -> None:
+    """Make the ends of keys (C, T, K) equal where `signs` (T,) is not 0: both become their mean; rotations stay unit.
+
+    counts: (T,) of each track's keys.
+    """
+    tied = np.flatnonzero(signs)
+    last, sign = np.array(counts)[tied] - 1, signs[tied]
+    ends = (keys[:, tied, 0] + sign * keys[:, tied, last]) / 2
+    if len(keys) == 4:
+        ends = playback.normalize(ends)
+    keys[:, tied, 0], keys[:, tied, last] = ends, sign * ends

@@ -1,0 +1,94 @@
+"""Searches of several clips side by side: each step tries one plan in every clip that is not finished."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from anim.arrays import Bools, Floats
+from anim.model import Clip
+from anim.optimization.options import Effort
+from anim.optimization.search.bound_usage import BoundUsage
+from anim.optimization.search.context import Context
+from anim.optimization.search.plan import TrialResult
+from anim.optimization.search.search import Search, search
+from anim.optimization.search.source_motion import SourceMotion, analyze_source
+from anim.optimization.search.stacked_clips import StackedClips
+from anim.optimization.search.trial import ClipTrials, Trial
+from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION, TrialBatch
+
+
+@dataclass(frozen=True, slots=True)
+class SearchRequest:
+    """A clip to search.
+
+    free: indices of the tracks that may change. bound: m, error bound. spent: m, the part of it that other tracks use.
+    droppable: (free tracks) whether each may be dropped. shared: per free track, constants of other clips, the most
+    frequent first. extra: further points to measure, (index of the surface, index of the vertex).
+    """
+
+    clip: Clip
+    free: tuple[int, ...]
+    bound: float
+    spent: float
+    droppable: Bools
+    shared: tuple[Sequence[Floats], ...]
+    extra: frozenset[tuple[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The best trial of a clip's search, with the motion that it approximates."""
+
+    source: SourceMotion
+    result: TrialResult
+
+
+def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[Found | None]:
+    """Return what is found for each clip; None without a result within all bounds."""
+    sources = [
+        analyze_source(
+            context.skeleton,
+            each.clip,
+            each.free,
+            context.points,
+            context.answering,
+            reference=context.policy.reference,
+            chord_tolerance=CHORD_BOUND_FRACTION * each.bound,
+        )
+        for each in requests
+    ]
+    clips = StackedClips(context.skeleton, sources, context.points)
+    trials = [
+        ClipTrials(source, context.coding, each.bound, each.droppable, each.shared)
+        for source, each in zip(clips.sources, requests, strict=True)
+    ]
+    allowed = np.tile([each.bound - each.spent for each in requests], (len(context.points), 1))
+    usage = BoundUsage(context.skeleton, clips, allowed, context.bounds)
+    batch = TrialBatch(context.skeleton, clips, trials, usage, context.coding)
+    searches = [
+        search(source, each.bound, effort, partial(batch.leeway, n))
+        for n, (source, each) in enumerate(zip(clips.sources, requests, strict=True))
+    ]
+    best = run_searches(batch, searches)
+    return [
+        None if result is None else Found(source, result) for source, result in zip(clips.sources, best, strict=True)
+    ]
+
+
+def run_searches(batch: TrialBatch, searches: Sequence[Search]) -> list[TrialResult | None]:
+    """Return the result of each clip's search, all of whose trials are run by the batch."""
+    best: list[TrialResult | None] = [None] * len(searches)
+    answers: dict[int, TrialResult | None] = dict.fromkeys(range(len(searches)))
+    while answers:
+        asked: list[tuple[int, Trial]] = []
+        for n, answer in answers.items():
+            try:
+                asked.append((n, searches[n].send(answer)))
+            except StopIteration as end:
+                best[n] = end.value
+        answers = dict(zip((n for n, _ in asked), batch.run(asked), strict=True))
+    return best
