@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -226,6 +227,8 @@ def _search_within_bounds(
         found = result.verdict
         if found.holds:
             return result
+        if not math.isfinite(found.usage):  # the ends cannot be stored, within whatever bound
+            return None
         worst = optimizer.worst_vertex(found)
         factor = NEW_VERTEX_RETRY_FACTOR if worst - task.extra else min(RETRY_FACTOR / found.usage, RETRY_FACTOR)
         task = replace(task, bound=task.bound * factor, extra=task.extra | worst)

@@ -99,9 +99,12 @@ class KeyFit:
         found = np.zeros_like(right)
         for axis in np.unique(axis_of).tolist():
             mine, count = np.flatnonzero(axis_of == axis), int(self._axes.counts[axis])
+            some = right[:, mine, :count]
+            if count == 1:
+                found[:, mine, :count] = some / self._diagonal[axis, 0]
+                continue
             bands = np.zeros((2, count))
             bands[0, 1:], bands[1] = self._beside[axis, : count - 1], self._diagonal[axis, :count]
-            some = right[:, mine, :count]
             solved = solveh_banded(bands, some.reshape(-1, count).T)
             found[:, mine, :count] = solved.T.reshape(some.shape)
         return found

@@ -12,10 +12,10 @@ from anim.optimization.options import Packing
 from anim.optimization.search import playback
 from anim.optimization.search.key_fit import KeyFit
 from anim.optimization.search.key_intervals import KeyIntervals, find_intervals
-from anim.optimization.search.source_motion import ROTATION
 from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.time_axes import SharedAxis
 from anim.optimization.tracks import quantization
+from anim.optimization.tracks.clip_ends import close_ends
 from anim.optimization.tracks.quantization import EncodedKeys
 
 MAX_STACKED_VALUES = 1 << 18  # tracks × times at a time, each with about 300 bytes of temporary arrays
@@ -65,13 +65,16 @@ class KeyedTracks:
         intervals = find_intervals(keys, clips, clip_of)
         return KeyedAxes(axis_of, intervals, KeyFit(intervals, clips.weights[clip_of]))
 
-    def vectors(self, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
-        """Yield all translations and scales on axes. tolerances: (T,) for storage, in units of values."""
-        yield from self._each(np.flatnonzero((axes.axis_of >= 0) & (self._clips.path != ROTATION)), axes, tolerances)
+    def each(self, path: int, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
+        """Yield all tracks of a path on axes, so many at a time as memory allows.
 
-    def rotations(self, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
-        """Yield all rotations on axes. tolerances: (T,) for storage, in units of values."""
-        yield from self._each(np.flatnonzero((axes.axis_of >= 0) & (self._clips.path == ROTATION)), axes, tolerances)
+        path: index in PATHS. tolerances: (T,) for storage, in units of values.
+        """
+        clips = self._clips
+        tracks = np.flatnonzero((axes.axis_of >= 0) & (clips.path == path))
+        count = max(MAX_STACKED_VALUES // clips.at.shape[1], 1)
+        for some in (tracks[first : first + count] for first in range(0, len(tracks), count)):
+            yield self.store(some, clips.local[path][:, clips.row[some], clips.clip[some]], axes, tolerances)
 
     def store(self, tracks: Ints, values: Floats, axes: KeyedAxes, tolerances: Floats) -> StoredTracks:
         """Return tracks of one kind on axes, with other values (C, T, W) than their own.
@@ -80,20 +83,15 @@ class KeyedTracks:
         """
         axis_of = axes.axis_of[tracks]
         keys = self._fit(tracks, values, axes)
-        counts = axes.intervals.counts[axis_of].tolist()
-        _close_ends(keys, self._closures[tracks], counts)
+        counts = axes.intervals.counts[axis_of]
+        close_ends(keys, self._closures[tracks], counts)
         paths = [self._moving[i].path for i in tracks.tolist()]
-        stored, keys = quantization.encode_stack(keys, counts, paths, tolerances[tracks].tolist(), self._packing)
+        stored, keys = quantization.encode_stack(
+            keys, counts.tolist(), paths, tolerances[tracks].tolist(), self._packing
+        )
         play = playback.slerp_raw if len(values) == 4 else playback.lerp
         shown = play(keys, axes.intervals.left[axis_of], axes.intervals.u[axis_of])
         return StoredTracks(tracks, stored, keys, shown)
-
-    def _each(self, tracks: Ints, axes: KeyedAxes, tolerances: Floats) -> Iterator[StoredTracks]:
-        """Tracks of one kind, so many at a time as memory allows."""
-        count = max(MAX_STACKED_VALUES // self._clips.at.shape[1], 1)
-        for some in (tracks[first : first + count] for first in range(0, len(tracks), count)):
-            values = self._clips.padded([self._moving[i].values for i in some.tolist()])
-            yield self.store(some, values, axes, tolerances)
 
     def _fit(self, tracks: Ints, values: Floats, axes: KeyedAxes) -> Floats:
         """Keys (C, T, K) of values (C, T, W): on an axis with every key their own, else a fit."""
@@ -110,16 +108,3 @@ class KeyedTracks:
             fitted = axes.fit.vectors(values, axis_of)
         fitted[:, is_full] = keys[:, is_full]
         return fitted
-
-
-def _close_ends(keys: Floats, signs: Floats, counts: Sequence[int]) -> None:
-    """Make the ends of keys (C, T, K) equal where `signs` (T,) is not 0: both become their mean; rotations stay unit.
-
-    counts: (T,) of each track's keys.
-    """
-    tied = np.flatnonzero(signs)
-    last, sign = np.array(counts)[tied] - 1, signs[tied]
-    ends = (keys[:, tied, 0] + sign * keys[:, tied, last]) / 2
-    if len(keys) == 4:
-        ends = playback.normalize(ends)
-    keys[:, tied, 0], keys[:, tied, last] = ends, sign * ends

@@ -45,12 +45,21 @@ class SegmentErrors:
         # [e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
         self._errors = errors[:longest].transpose(1, 2, 0)
 
-    def costs(self, tracks: Ints, budgets: Floats) -> NDArray[np.float32]:
+    def __len__(self) -> int:
+        """Return the number of keys of each track."""
+        return len(self._errors)
+
+    @property
+    def span(self) -> int:
+        """The most intervals that a segment covers."""
+        return int(self._errors.shape[2])
+
+    def costs(self, tracks: Ints, budgets: Floats, ends: slice = slice(None)) -> NDArray[np.float32]:
         """Return the costs (K, k, span) of segments that end at each key of the `tracks` (k,) under budgets (k,) in m.
 
-        About 1 within the budget, inf above it and where there is no segment.
+        About 1 within the budget, inf above it and where there is no segment. ends: some of the keys.
         """
-        shares = self._errors[:, tracks] * (1 / budgets).astype(np.float32)[:, None]
+        shares = self._errors[ends, tracks] * (1 / budgets).astype(np.float32)[:, None]
         return np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
 
 
@@ -61,19 +70,22 @@ def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Boo
     """
     found: list[Bools] = []
     waiting: list[NDArray[np.float32]] = []
-    size = 0
     for errors, tracks, budgets in asked:
-        costs = errors.costs(tracks, budgets)
-        is_long = len(costs) > KEYS_PER_PART
-        if waiting and (is_long or size + costs.size > MAX_STACKED_VALUES):
+        is_long = len(errors) > KEYS_PER_PART
+        if waiting and (is_long or _stacked_size(waiting, errors, len(tracks)) > MAX_STACKED_VALUES):
             found += _stacked_keys(waiting)
-            waiting, size = [], 0
+            waiting = []
         if is_long:
-            found.append(_keys_of_parts(costs))
+            found.append(_keys_of_parts(errors, tracks, budgets))
         else:
-            waiting.append(costs)
-            size += costs.size
+            waiting.append(errors.costs(tracks, budgets))
     return found + (_stacked_keys(waiting) if waiting else [])
+
+
+def _stacked_size(waiting: Sequence[NDArray[np.float32]], errors: SegmentErrors, tracks: int) -> int:
+    """Values of tables of costs (K, k, span) in one array with those of some tracks of another one."""
+    counts, widths, spans = zip((len(errors), tracks, errors.span), *(costs.shape for costs in waiting), strict=True)
+    return int(max(counts) * sum(widths) * max(spans))
 
 
 def _stacked_keys(tables: Sequence[NDArray[np.float32]]) -> list[Bools]:
@@ -88,17 +100,30 @@ def _stacked_keys(tables: Sequence[NDArray[np.float32]]) -> list[Bools]:
     return [part[:, :count] for part, count in zip(np.split(keep, ends[:-1]), counts, strict=True)]
 
 
-def _keys_of_parts(costs: NDArray[np.float32]) -> Bools:
-    """The same for long tracks: all parts of KEYS_PER_PART keys are searched at once, and a key stays between two."""
+def _keys_of_parts(errors: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:
+    """The keys (k, K) of long tracks, searched in parts of KEYS_PER_PART keys, between which a key stays."""
+    keep = np.ones((len(tracks), len(errors)), np.bool_)
+    parts = max(MAX_STACKED_VALUES // (len(tracks) * errors.span * KEYS_PER_PART), 1)
+    for start in range(1, len(errors), parts * KEYS_PER_PART):
+        some = slice(start, start + parts * KEYS_PER_PART)
+        keep[:, some] = _keys_after_first(errors.costs(tracks, budgets, some))
+    return keep
+
+
+def _keys_after_first(costs: NDArray[np.float32]) -> Bools:
+    """Keys (k, n) after a first one, on paths through those between two parts; all parts are searched at once.
+
+    costs: (n, k, span) of the segments that end at each key; inf where none does.
+    """
     count, tracks, span = costs.shape
-    parts = -(-(count - 1) // KEYS_PER_PART)
-    last = np.append(np.full(parts - 1, KEYS_PER_PART), count - 1 - (parts - 1) * KEYS_PER_PART)
-    rows = np.full((parts * KEYS_PER_PART, tracks, span), np.inf, np.float32)
-    rows[: count - 1] = costs[1:]
-    rows = rows.reshape(parts, KEYS_PER_PART, tracks, span).transpose(1, 2, 0, 3)
-    keep = _fewest_keys(rows.reshape(KEYS_PER_PART, tracks * parts, span), np.tile(last, tracks))
-    inner = keep[:, 1:].reshape(tracks, parts * KEYS_PER_PART)[:, : count - 1]
-    return np.concatenate((np.ones((tracks, 1), np.bool_), inner), axis=1)
+    length = min(count, KEYS_PER_PART)
+    parts = -(-count // length)
+    last = np.append(np.full(parts - 1, length), count - (parts - 1) * length)
+    missing = np.full((parts * length - count, tracks, span), np.inf, np.float32)
+    rows = np.concatenate((costs, missing)) if len(missing) else costs
+    rows = rows.reshape(parts, length, tracks, span).transpose(1, 2, 0, 3).reshape(length, tracks * parts, span)
+    keep = _fewest_keys(rows, np.tile(last, tracks))
+    return keep[:, 1:].reshape(tracks, parts * length)[:, :count]
 
 
 def _fewest_keys(costs: NDArray[np.float32], last: Ints) -> Bools:

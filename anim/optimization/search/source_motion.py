@@ -204,7 +204,7 @@ def _source_tracks(
             unit = float(meters[k])
             closure = closure_sign(values[k], chord_tolerance / unit if unit else 0.0)
             errors = float(from_rest[k]), float(from_middle[k])
-            found[number] = SourceTrack(number, node, path, values[k], rest[k], middle[k], unit, *errors, closure)
+            found[number] = SourceTrack(number, node, path, every[node], rest[k], middle[k], unit, *errors, closure)
     return tuple(found[i] for i in free)
 
 

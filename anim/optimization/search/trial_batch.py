@@ -16,7 +16,7 @@ from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.keyed_tracks import KeyedAxes, KeyedTracks, StoredTracks
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
 from anim.optimization.search.plan import RotationTarget, TrackAction, TrialResult
-from anim.optimization.search.source_motion import ROTATION
+from anim.optimization.search.source_motion import PATHS, ROTATION
 from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.time_axes import SharedAxis, find_axes
 from anim.optimization.search.trial import ClipTrials, Decisions, Trial
@@ -24,6 +24,8 @@ from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
 
 CHORD_BOUND_FRACTION = 0.02  # of the bound; if slerp and nlerp are closer, only slerp is measured
+
+NOTHING = np.empty((0, 0, 0))  # values that were written: they are large for long clips
 
 Request: TypeAlias = tuple[int, Trial]  # index of the clip, and what to try in it
 
@@ -75,7 +77,10 @@ class TrialBatch:
         return self._leeway[clip]
 
     def run(self, requests: Sequence[Request]) -> list[TrialResult | None]:
-        """Return the result of each trial; None for one that takes `limit` or more bytes."""
+        """Return the result of each trial; None for one that takes `limit` or more bytes.
+
+        requests: in the order of their clips.
+        """
         actions = [self._trials[clip].actions(trial.plan) for clip, trial in requests]
         axes = self._find_axes(requests, actions)
         found: dict[int, TrialResult | None] = {}
@@ -160,17 +165,15 @@ class TrialBatch:
         first = self._clips.first_track
         for clip, each in zip(played.clips.tolist(), played.decisions, strict=True):
             tolerances[first[clip] : first[clip + 1]] = each.tolerances
+        paths = list(range(len(PATHS)))
         if target is RotationTarget.WORLD:
-            yield from self._compensation.follow(axes, tolerances, played.shown[ROTATION], played.clips)
-        else:
-            for made in self._keyed.rotations(axes, tolerances):
-                self._write(played, ROTATION, made.tracks, made.shown)
-                yield made
-        for made in self._keyed.vectors(axes, tolerances):
-            paths = self._clips.path[made.tracks]
-            for path in set(paths.tolist()):
-                self._write(played, path, made.tracks[paths == path], made.shown[:, paths == path])
-            yield made
+            paths.remove(ROTATION)
+            for made in self._compensation.follow(axes, tolerances, played.shown[ROTATION], played.clips):
+                yield made._replace(shown=NOTHING)
+        for path in paths:
+            for made in self._keyed.each(path, axes, tolerances):
+                self._write(played, path, made.tracks, made.shown)
+                yield made._replace(shown=NOTHING)
 
     def _write(self, played: _Played, path: int, tracks: Ints, values: Floats) -> None:
         """Write the values (C, T, W) of tracks of one path to what is shown."""

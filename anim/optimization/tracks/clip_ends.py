@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anim.arrays import Floats
-from anim.maths import quaternion
+from anim.arrays import Floats, Ints
 from anim.model import Clip, Interpolation, Track, ValueKind
 
 
@@ -26,20 +25,17 @@ def closure_sign(values: Floats, tolerance: float) -> float:
     return next((sign for sign in signs if np.linalg.norm(values[-1] - sign * values[0]) <= tolerance), 0.0)
 
 
-def close_ends(keys: Floats, signs: Floats) -> Floats:
-    """Return keys (K, G, C) whose ends are equal where `signs` (G,) is not 0: both become their mean.
+def close_ends(keys: Floats, signs: Floats, counts: Ints) -> None:
+    """Make the ends of keys (C, T, K) equal where `signs` (T,) is not 0: both become their mean; rotations stay unit.
 
-    Rotations stay unit.
+    counts: (T,) of each track's keys, of which the others are ignored.
     """
     tied = np.flatnonzero(signs)
-    if not len(tied):
-        return keys
-    keys, sign = keys.copy(), signs[tied, None]
-    ends = (keys[0, tied] + sign * keys[-1, tied]) / 2
-    if keys.shape[2] == 4:
-        ends = quaternion.normalize(ends)
-    keys[0, tied], keys[-1, tied] = ends, sign * ends
-    return keys
+    last, sign = counts[tied] - 1, signs[tied]
+    ends = (keys[:, tied, 0] + sign * keys[:, tied, last]) / 2
+    if len(keys) == 4:
+        ends /= np.sqrt((ends * ends).sum(axis=0))
+    keys[:, tied, 0], keys[:, tied, last] = ends, sign * ends
 
 
 def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:

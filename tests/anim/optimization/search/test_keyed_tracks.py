@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from anim.arrays import Bools, Floats
+from anim.arrays import Bools, Floats, Ints
 from anim.maths import quaternion
 from anim.optimization.options import Packing
 from anim.optimization.search import keyed_tracks, playback
 from anim.optimization.search.keyed_tracks import KeyedAxes, KeyedTracks, StoredTracks
-from anim.optimization.search.source_motion import ROTATION, SourceTrack
+from anim.optimization.search.source_motion import PATHS, ROTATION, SourceTrack
+from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.time_axes import SharedAxis
-from anim.optimization.tracks.clip_ends import close_ends
 from anim.sampling.track import sample
 from tests.anim.optimization.making import TIMES, turning, waving
 from tests.anim.optimization.search.stacks import CLIPS, stack
-from tests.clips import about, clip, track
+from tests.clips import CUBICSPLINE, about, clip, track
 
 STACKED = stack(*CLIPS)
 TRACKS: list[SourceTrack] = [each for source in STACKED.sources for each in source.moving]
@@ -43,7 +43,12 @@ def _axes(keyed: KeyedTracks, masks: Sequence[Bools], clips: Sequence[int] = (0,
 
 def _made(keyed: KeyedTracks, axes: KeyedAxes, tolerance: float = 1e-3) -> list[StoredTracks]:
     tolerances = np.full(len(TRACKS), tolerance)
-    return [*keyed.rotations(axes, tolerances), *keyed.vectors(axes, tolerances)]
+    return _each(keyed, axes, tolerances)
+
+
+def _each(keyed: KeyedTracks, axes: KeyedAxes, tolerances: Floats) -> list[StoredTracks]:
+    """The tracks of all paths."""
+    return [made for path in range(len(PATHS)) for made in keyed.each(path, axes, tolerances)]
 
 
 @pytest.mark.parametrize("packing", list(Packing))
@@ -105,7 +110,7 @@ def test_tracks_of_clips_together_are_those_of_each_alone(packing: Packing, mask
         alone = KeyedTracks(stack(what), packing)
         axes = alone.on([(0, [SharedAxis(masks[number], MEMBERS[number])])])
         tolerances = np.full(len(what.tracks), 1e-3)
-        for made in (*alone.rotations(axes, tolerances), *alone.vectors(axes, tolerances)):
+        for made in _each(alone, axes, tolerances):
             for t, i in enumerate(made.tracks.tolist()):
                 stored, shown = together[i + int(STACKED.first_track[number])]
                 assert (stored.form, stored.codes) == (made.stored[t].form, made.stored[t].codes)
@@ -126,19 +131,19 @@ def test_many_tracks_are_made_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = _made(keyed, _axes(keyed, THIRDS))
     monkeypatch.setattr(keyed_tracks, "MAX_STACKED_VALUES", 2 * STACKED.at.shape[1])
     parts = _made(keyed, _axes(keyed, THIRDS))
-    assert [len(each.tracks) for each in parts] == [2, 2, 1, 2, 1]
+    assert [len(each.tracks) for each in whole] == [1, 5, 2]
+    assert [len(each.tracks) for each in parts] == [1, 2, 2, 1, 2]
     for kind in (4, 3):
         some, every = ([made for made in each if len(made.keys) == kind] for each in (parts, whole))
-        for field in ("tracks", "keys", "shown"):
-            axis = min(getattr(every[0], field).ndim - 1, 1)
-            joined = np.concatenate([getattr(made, field) for made in some], axis=axis)
-            np.testing.assert_array_equal(joined, getattr(every[0], field))
+        for field, axis in (("tracks", 0), ("keys", 1), ("shown", 1)):
+            found, expected = (np.concatenate([getattr(made, field) for made in each], axis) for each in (some, every))
+            np.testing.assert_array_equal(found, expected)
 
 
 def test_chords() -> None:
     keyed = KeyedTracks(STACKED, Packing.CORE)
     axes = _axes(keyed, THIRDS)
-    for made in keyed.rotations(axes, np.full(len(TRACKS), 1e-3)):
+    for made in keyed.each(ROTATION, axes, np.full(len(TRACKS), 1e-3)):
         axis_of = axes.axis_of[made.tracks]
         shown = playback.nlerp(made.keys, axes.intervals.left[axis_of], axes.intervals.u[axis_of])
         for t, i in enumerate(made.tracks.tolist()):
@@ -150,11 +155,18 @@ def test_chords() -> None:
             assert pytest.approx(expected, abs=1e-12) == shown[:, t].T
 
 
+def _values(stacked: StackedClips, tracks: Ints) -> Floats:
+    """The rotations (4, T, W) of some tracks, their last value repeated."""
+    every = [each.values for source in stacked.sources for each in source.moving]
+    length = stacked.at.shape[1]
+    return np.stack([np.pad(every[i], ((0, length - len(every[i])), (0, 0)), "edge").T for i in tracks.tolist()], 1)
+
+
 def test_other_values_than_their_own() -> None:
     """The same call as for their own, with rotations of other tracks: on the axis with every key these are stored."""
     keyed = KeyedTracks(STACKED, Packing.CORE)
     tracks = np.flatnonzero((STACKED.path == ROTATION) & (STACKED.clip == 1))
-    values = STACKED.padded([TRACKS[i].values for i in tracks[::-1].tolist()])
+    values = _values(STACKED, tracks[::-1])
     made = keyed.store(tracks, values, _axes(keyed, FULL), np.zeros(len(TRACKS)))
     for stored, i in zip(made.stored, tracks[::-1].tolist(), strict=True):
         assert (stored.values == TRACKS[i].values[STACKED.sources[1].on_grid].astype(np.float32)).all()
@@ -167,7 +179,7 @@ def _loops() -> list[Floats]:
 
 
 def test_closed_tracks_stay_closed_to_the_bit() -> None:
-    """Beside a clip with fewer keys on its axis: by the mean of both ends, as `close_ends` makes them."""
+    """Beside a clip with fewer keys on its axis: by the mean of both ends."""
     loops = clip(*(track("rotation", TIMES, each, node=node) for node, each in enumerate(_loops())))
     stacked = stack(loops, waving())
     closures = [each.closure for each in stacked.sources[0].moving]
@@ -175,14 +187,31 @@ def test_closed_tracks_stay_closed_to_the_bit() -> None:
     keyed = KeyedTracks(stacked, Packing.CORE)
     keys = np.arange(25) % 6 == 0
     axes = keyed.on([(0, [SharedAxis(keys, (0, 1, 2))]), (1, [SharedAxis(FULL[1], (0, 1, 2))])])
-    (made,) = keyed.rotations(axes, np.zeros(len(stacked.clip)))
+    (made,) = keyed.each(ROTATION, axes, np.zeros(len(stacked.clip)))
     ends = [(stored.values[0], stored.values[-1]) for stored in made.stored[:3]]
     assert (ends[0][0] == ends[0][1]).all()
     assert (ends[1][0] == -ends[1][1]).all()
     assert np.abs(ends[2][0] - ends[2][1]).max() > 0.5
-    values = stacked.padded([each.values for each in stacked.sources[0].moving])
+    values = _values(stacked, np.arange(3))
     start = values[:, :, stacked.on_grid[0, keys]]
     fitted = axes.fit.rotations(values, np.concatenate((start, start[..., -1:].repeat(20, 2)), 2), axes.axis_of[:3])
-    expected = close_ends(np.transpose(fitted[..., :5], (2, 1, 0)), np.array(closures))
-    for t, stored in enumerate(made.stored[:3]):
-        assert (stored.values == expected[:, t].astype(np.float32)).all()
+    for t, (stored, sign) in enumerate(zip(made.stored[:3], closures, strict=True)):
+        expected = fitted[:, t, :5].T
+        if sign:
+            mean = quaternion.normalize((expected[0] + sign * expected[-1]) / 2)
+            expected[0], expected[-1] = mean, sign * mean
+        assert stored.values == pytest.approx(expected, abs=1e-7)
+
+
+def test_an_axis_with_every_key_has_the_truth_beside_one_with_fewer() -> None:
+    """Of a spline, which no line fits: its middles don't move its keys."""
+    knots, slopes = np.array([[0.0, 0, 0], [1, 2, 0], [0, 1, 1]]), np.full((3, 3), 9.0)
+    spline = clip(track("translation", [0, 1, 2], knots, CUBICSPLINE, tangents=(slopes, -slopes), node=0))
+    stacked = stack(spline, waving())
+    keyed = KeyedTracks(stacked, Packing.CORE)
+    source = stacked.sources[0]
+    full = SharedAxis(np.ones(len(source.grid), np.bool_), (0,))
+    axes = keyed.on([(0, [full]), (1, [SharedAxis(THIRDS[1], (0,))])])
+    (made,) = keyed.each(PATHS.index("translation"), axes, np.zeros(len(stacked.clip)))
+    assert made.tracks.tolist() == [0, 1]
+    assert (made.stored[0].values == source.moving[0].values[source.on_grid].astype(np.float32)).all()

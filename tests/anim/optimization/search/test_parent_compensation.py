@@ -13,7 +13,7 @@ from anim.model import Scene
 from anim.optimization.options import Packing
 from anim.optimization.search.keyed_tracks import KeyedTracks
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
-from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.source_motion import ROTATION, SourceMotion
 from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.time_axes import SharedAxis
 from tests.anim.optimization.making import TIMES, truth_of, turning
@@ -58,7 +58,7 @@ def _shown(source: SourceMotion, keys: Bools) -> tuple[Floats, Floats]:
     keyed = KeyedTracks(clips, Packing.EXT)
     axes = keyed.on([(0, [SharedAxis(keys, (0, 1, 2, 3))])])
     local, aimed = clips.local[1].copy(), clips.local[1].copy()
-    for made in keyed.rotations(axes, COARSE):
+    for made in keyed.each(ROTATION, axes, COARSE):
         local[:, clips.row[made.tracks], 0] = made.shown
     found = list(ParentCompensation(ARM.skeleton, clips, keyed).follow(axes, COARSE, aimed, ONE))
     assert sorted(i for made in found for i in made.tracks.tolist()) == [0, 1, 2, 3]

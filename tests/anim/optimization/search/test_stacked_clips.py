@@ -54,12 +54,14 @@ def test_tracks_follow_one_another() -> None:
 
 def test_values_are_padded_by_their_last() -> None:
     stacked = stack(*CLIPS)
-    values = [source.moving[0].values for source in (stacked.sources[0], stacked.sources[2])]
-    found = stacked.padded(values)
-    assert found.shape == (4, 2, stacked.at.shape[1])
-    for t, each in enumerate(values):
-        assert (found[:, t, : len(each)] == each.T).all()
-        assert (found[:, t, len(each) :] == each[-1][:, None]).all()
+    every = [each for source in stacked.sources for each in source.moving]
+    for each, path, row, number in zip(every, stacked.path, stacked.row, stacked.clip, strict=True):
+        found = stacked.local[path][:, row, number]
+        count = len(each.values)
+        assert (found[:, :count] == each.values.T).all()
+        assert (found[:, count:] == each.values[-1][:, None]).all()
+    for b, source in enumerate(stacked.sources):
+        assert (stacked.rotation[:, :, b, : len(source.at)] == np.moveaxis(source.local[1], 2, 0)).all()
 
 
 def test_columns_are_the_sampled_poses() -> None:

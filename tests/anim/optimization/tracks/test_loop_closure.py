@@ -45,14 +45,18 @@ def test_signs_of_closure() -> None:
 
 
 def test_ends_are_closed_in_the_middle() -> None:
-    keys = np.array([[ZERO, ZERO], [ONE, ONE], [[0, 0.2, 0], [0, 0.2, 0]]])
-    found = close_ends(keys, np.array([1.0, 0.0]))
-    assert found[:, 0].tolist() == [[0, 0.1, 0], ONE, [0, 0.1, 0]]
+    """Of tracks with fewer keys than there is room for, too: what lies after their last one stays."""
+    keys = np.moveaxis(np.array([[ZERO, ONE, [0, 0.2, 0], ONE]] * 2 + [[ZERO, ONE, ONE, [0, 0.4, 0]]]), 2, 0)
+    found = keys.copy()
+    close_ends(found, np.array([1.0, 0.0, 1.0]), np.array([3, 3, 4]))
+    assert found[:, 0].T.tolist() == [[0, 0.1, 0], ONE, [0, 0.1, 0], ONE]
+    assert (found[:, 0, 0] == found[:, 0, 2]).all()
     assert (found[:, 1] == keys[:, 1]).all()
-    turns = np.stack([np.array(HERE), np.array(AWAY), -about("z", 20.0)])[:, None]
-    found = close_ends(turns, np.array([-1.0]))[:, 0]
-    assert (found[-1] == -found[0]).all()
-    assert found[0] == pytest.approx(about("z", 10.0))
+    assert found[:, 2].T.tolist() == [[0, 0.2, 0], ONE, ONE, [0, 0.2, 0]]
+    turns = np.array([HERE, AWAY, (-about("z", 20.0)).tolist()]).T[:, None]
+    close_ends(turns, np.array([-1.0]), np.array([3]))
+    assert (turns[:, 0, -1] == -turns[:, 0, 0]).all()
+    assert turns[:, 0, 0] == pytest.approx(about("z", 10.0))
 
 
 def test_opened_tracks_are_those_that_closed_before() -> None:
