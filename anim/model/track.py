@@ -112,6 +112,33 @@ class Track:
         set_field(self, "in_tangents", _tangents(in_tangents, shape, "in tangents"))
         set_field(self, "out_tangents", _tangents(out_tangents, shape, "out tangents"))
 
+    @classmethod
+    def unchecked(
+        cls,
+        node: int | None,
+        path: str,
+        interpolation: Interpolation,
+        time_axis: TimeAxis,
+        values: Floats,
+        in_tangents: Floats | None = None,
+        out_tangents: Floats | None = None,
+        pointer: str | None = None,
+        storage: AccessorFormat = FLOAT32,
+    ) -> Track:
+        """Return the track of fields that are valid and read-only already: files have thousands of them."""
+        track, set_field = object.__new__(cls), object.__setattr__
+        set_field(track, "node", node)
+        set_field(track, "path", path)
+        set_field(track, "interpolation", interpolation)
+        set_field(track, "time_axis", time_axis)
+        set_field(track, "values", values)
+        set_field(track, "in_tangents", in_tangents)
+        set_field(track, "out_tangents", out_tangents)
+        set_field(track, "pointer", pointer)
+        set_field(track, "storage", storage)
+        set_field(track, "_digest", None)
+        return track
+
     def __reduce__(self) -> tuple[Any, ...]:
         return arrays.reduce_fields(self)
 
@@ -138,12 +165,7 @@ class Track:
 
         Nothing is checked again: files have the same keys on thousands of nodes.
         """
-        moved = object.__new__(Track)
-        for name in _COPIED:
-            object.__setattr__(moved, name, getattr(self, name))
-        object.__setattr__(moved, "node", node)
-        object.__setattr__(moved, "_digest", None)
-        return moved
+        return Track.unchecked(node, *(getattr(self, name) for name in _COPIED))
 
     def __eq__(self, other: object) -> bool:
         """Return whether the other track has the same keys, target and storage."""
@@ -160,10 +182,13 @@ class Track:
     def digest(self) -> bytes:
         """Digest of target, keys and storage, for comparisons of many tracks with each other."""
         if self._digest is None:
-            import hashlib  # loads OpenSSL, and few files have tracks to compare
+            try:
+                from _blake2 import blake2b  # part of hashlib, which loads OpenSSL
+            except ImportError:  # of another Python than CPython
+                from hashlib import blake2b
 
             header = repr((*self._words, self.values.shape))
-            digest = hashlib.blake2b(header.encode(errors="surrogatepass"), digest_size=16)
+            digest = blake2b(header.encode(errors="surrogatepass"), digest_size=16)
             for numbers in self._numbers:
                 if numbers is not None:
                     digest.update(np.ascontiguousarray(numbers).data)

@@ -10,14 +10,15 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Floats, Ints, freeze, is_finite
 from anim.errors import AnimError, FormatError, UnsupportedError
-from anim.gltf.document import Bytes, Document, Json, json_array
+from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.memory import MemoryBudget
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOAT = 5126
+FLOAT_VECTORS = {(FLOAT, "SCALAR"): 1, (FLOAT, "VEC2"): 2, (FLOAT, "VEC3"): 3, (FLOAT, "VEC4"): 4}  # components
 T = TypeVar("T")
 
 
@@ -75,6 +76,35 @@ class Accessors:
         numpy warns of a signaling NaN; callers that read many accessors disable that warning once, which takes time.
         """
         return self._located(index, self._floats)
+
+    def plain_floats(self, indices: Iterable[int]) -> dict[int, Floats]:
+        """Return `floats` of those accessors that are uncompressed float32 vectors, decoded in one call.
+
+        Parts of one read-only array. Without the others, and empty if a number is not finite.
+        """
+        words: dict[int, NDArray[Any]] = {}  # of buffers, as float32
+        parts, places, size = [], [], 0
+        for index in dict.fromkeys(indices):
+            about = self._accessors[index]
+            rows = FLOAT_VECTORS.get((about["componentType"], about["type"]))
+            if rows is None or "bufferView" not in about or "sparse" in about or index in self._given:
+                continue
+            view = self._views[about["bufferView"]]
+            if "extensions" in view or view.get("byteStride", 4 * rows) != 4 * rows:
+                continue
+            number, count = view["buffer"], about["count"]
+            if number not in words:
+                words[number] = _float_words(self._document.buffers[number])
+            start = view.get("byteOffset", 0) + about.get("byteOffset", 0)
+            part = words[number][start // 4 : start // 4 + count * rows]
+            if start % 4 == 0 and len(part) == count * rows:
+                parts.append(part)
+                places.append((index, size, size := size + len(part), count, rows))
+        self.budget.add(8 * size)
+        joined = freeze(np.concatenate(parts, dtype=np.float64)) if parts else np.zeros(0)
+        if not is_finite(joined):
+            return {}
+        return {index: joined[start:end].reshape(count, rows) for index, start, end, count, rows in places}
 
     def integers(self, index: int) -> Ints:
         """Return the values (count, components) as int64. Raises FormatError for floats."""
@@ -184,6 +214,15 @@ def denormalized(values: Floats, dtype: np.dtype[Any]) -> Floats:
     """Return normalized integers as fractions: c / max, signed ones clamped at −1."""
     scaled = values / float(np.iinfo(dtype).max)
     return np.maximum(scaled, -1.0) if dtype.kind == "i" else scaled
+
+
+def _float_words(buffer: Buffer) -> NDArray[Any]:
+    """The whole words of a buffer as float32; (0,) if it can't be read."""
+    try:
+        data = buffer.data
+    except AnimError:
+        return np.zeros(0, np.float32)
+    return data[: len(data) // 4 * 4].view("<f4")
 
 
 def _slice(data: Bytes, place: Json) -> Bytes:

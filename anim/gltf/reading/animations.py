@@ -32,9 +32,10 @@ class Reader:
         self._json = document.json
         self._accessors = accessors
         self._time_axes: dict[int, TimeAxis] = {}
-        self._values: dict[int, Floats] = {}
-        self._tracks: dict[tuple[object, ...], Track] = {}
-        self._of_any_node: dict[tuple[object, ...], Track] = {}
+        samplers = [each for animation in json_array(document.json, "animations") for each in animation["samplers"]]
+        self._plain = accessors.plain_floats(each[key] for each in samplers for key in ("input", "output"))
+        self._others: dict[int, Floats] = {}  # values of other accessors
+        self._tracks: dict[tuple[object, ...], dict[int | None, Track]] = {}  # by target and keys, by node
 
     def track(self, animation: Json, number: int) -> Track | None:
         """Return a channel of `animation` as a track, None without a supported target."""
@@ -42,85 +43,78 @@ class Reader:
         found = channel_targets.channel_target(channel)
         if found is None:
             return None
-        sampler = animation["samplers"][channel["sampler"]]
-        keys = sampler["input"], sampler["output"], sampler.get("interpolation")
-        if (found, keys) in self._tracks:
-            return self._tracks[found, keys]
         node, path, address = found
-        alike = self._of_any_node.get((path, keys)) if address is None else None
-        if alike is not None and node is not None:
-            return self._tracks.setdefault((found, keys), alike.on_node(node))
+        sampler = animation["samplers"][channel["sampler"]]
+        keys = path, address, sampler["input"], sampler["output"], sampler.get("interpolation")
+        alike = self._tracks.setdefault(keys, {})
+        if node in alike:
+            return alike[node]
         try:
-            track = self._track(sampler, node, path, address)
-            if address is None and path in NUM_COMPONENTS:  # others depend on the node
-                self._of_any_node[path, keys] = track
-            return self._tracks.setdefault((found, keys), track)
+            if alike and node is not None and path in NUM_COMPONENTS:  # other paths depend on the node
+                track = next(iter(alike.values())).on_node(node)
+            else:
+                track = self._track(sampler, node, path, address)
         except AnimError as error:
             if isinstance(error, RangeError | ShapeError):  # caused by the file, not by a caller
                 error = FormatError(error.problem, where=error.where, help=error.help)
             raise error.at(f"track {number} ({self._target_label(node, path, address)})", ": ") from None
+        alike[node] = track
+        return track
 
     def _track(self, sampler: Json, node: int | None, path: str, address: str | None) -> Track:
         name = sampler.get("interpolation", "LINEAR")
         interpolation = INTERPOLATIONS.get(name)
         if interpolation is None:
             raise FormatError(f"interpolation is '{name}' (expected STEP, LINEAR or CUBICSPLINE)")
-        axis = self._axis(sampler["input"])
-        output = self._accessors.about(sampler["output"])
-        width = self._width(node, path, output)
+        number = sampler["output"]
+        axis = self._time_axes.get(sampler["input"]) or self._axis(sampler["input"])
+        count = len(axis)
+        output = self._accessors.about(number)
+        storage = _storage(path, output["componentType"], output.get("normalized", False), output["type"])
+        # components per key; None if only the data determines it
+        width = None if path == "pointer" else NUM_COMPONENTS.get(path) or self._target_count(node)
         cubic = interpolation is Interpolation.CUBICSPLINE
-        if cubic and len(axis) < 2:
+        if cubic and count < 2:
             raise FormatError("CUBICSPLINE with one key (expected at least two)")
-        values = self._values.get(sampler["output"])
-        if values is None:
-            values = arrays.freeze(self._accessors.unchecked(sampler["output"]))
-            self._values[sampler["output"]] = values
-        rows = len(axis) * (3 if cubic else 1)
+        plain = self._plain.get(number)
+        values = self._other(number) if plain is None else plain
+        rows = count * (3 if cubic else 1)
         if width is None:  # a pointer: an array of elements per key if the count requires it
             width = values.size // rows
         if values.size != rows * width or not width:
             raise FormatError(
-                f"output accessor {sampler['output']} has {values.size} numbers (expected {rows * (width or 1)} for "
-                f"{len(axis)} keys{' with tangents' if cubic else ''} of {width or 'at least one'})"
+                f"output accessor {number} has {values.size} numbers (expected {rows * (width or 1)} for "
+                f"{count} keys{' with tangents' if cubic else ''} of {width or 'at least one'})"
             )
-        storage = _storage(output["componentType"], bool(output.get("normalized")), output["type"])
+        make = Track if plain is None else Track.unchecked
         if not cubic:
-            keys = values.reshape(len(axis), width)
+            keys = values.reshape(count, width)
             if path == "rotation":
                 _check_rotations(keys)
-            return Track(node, path, interpolation, axis, keys, pointer=address, storage=storage)
-        parts = values.reshape(len(axis), 3, width)
+            return make(node, path, interpolation, axis, keys, None, None, address, storage)
+        parts = values.reshape(count, 3, width)
         if path == "rotation":
             _check_rotations(parts[:, 1])
-        return Track(
-            node, path, interpolation, axis, parts[:, 1], parts[:, 0], parts[:, 2], pointer=address, storage=storage
-        )
+        return make(node, path, interpolation, axis, parts[:, 1], parts[:, 0], parts[:, 2], address, storage)
 
-    def _axis(self, index: int) -> TimeAxis:
-        found = self._time_axes.get(index)
+    def _other(self, index: int) -> Floats:
+        found = self._others.get(index)
         if found is None:
-            about = self._accessors.about(index)
-            if about["type"] != "SCALAR" or about["componentType"] != FLOAT:
-                got = f"{about['type']} of {about['componentType']}"
-                raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
-            try:
-                found = TimeAxis(arrays.freeze(self._accessors.floats(index))[:, 0])
-            except AnimError as error:
-                raise FormatError(error.problem, where=error.where, help=error.help) from None
-            self._time_axes[index] = found
+            found = self._others[index] = arrays.freeze(self._accessors.unchecked(index))
         return found
 
-    def _width(self, node: int | None, path: str, output: Json) -> int | None:
-        """Components per key, None if only the data determines it; checks the output's type."""
-        if path == "pointer":
-            return None
-        if output["type"] != TYPES[path]:
-            raise FormatError(f"output accessor is {output['type']} (expected {TYPES[path]})")
-        component_type, normalized = output["componentType"], output.get("normalized", False)
-        fractions = path in ("rotation", "weights") and component_type in FRACTIONS and normalized
-        if component_type != FLOAT and not fractions:
-            raise FormatError(f"output accessor has component type {component_type} (expected {FLOAT}, or normalized)")
-        return NUM_COMPONENTS[path] if path != "weights" else self._target_count(node)
+    def _axis(self, index: int) -> TimeAxis:
+        about = self._accessors.about(index)
+        if about["type"] != "SCALAR" or about["componentType"] != FLOAT:
+            got = f"{about['type']} of {about['componentType']}"
+            raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
+        plain = self._plain.get(index)
+        try:
+            times = arrays.freeze(self._accessors.floats(index)) if plain is None else plain
+            found = self._time_axes[index] = TimeAxis(times[:, 0])
+        except AnimError as error:
+            raise FormatError(error.problem, where=error.where, help=error.help) from None
+        return found
 
     def _target_count(self, node: int | None) -> int:
         count = channel_targets.target_count(self._json, node) if node is not None else 0
@@ -143,5 +137,11 @@ def _check_rotations(keys: Floats) -> None:
 
 
 @cache
-def _storage(component_type: int, normalized: bool, element: str) -> AccessorFormat:
+def _storage(path: str, component_type: int, normalized: bool, element: str) -> AccessorFormat:
+    """Format of an output accessor. Raises FormatError for one that its path does not allow."""
+    if path != "pointer" and element != TYPES[path]:
+        raise FormatError(f"output accessor is {element} (expected {TYPES[path]})")
+    fractions = path in ("rotation", "weights") and component_type in FRACTIONS and normalized
+    if path != "pointer" and component_type != FLOAT and not fractions:
+        raise FormatError(f"output accessor has component type {component_type} (expected {FLOAT}, or normalized)")
     return AccessorFormat(component_type, normalized, element)

@@ -62,15 +62,14 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     """
     _check(document)
     accessors = accessors or Accessors(document)
-    reader = animations.Reader(document, accessors)
     accessors.check_total(_sampled_accessors(document.json))
     with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
+        reader = animations.Reader(document, accessors)
         return tuple(_clip(i, animation, reader) for i, animation in enumerate(json_array(document.json, "animations")))
 
 
 def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, Clip], list[AnimError]]:
     """Return the readable animations by index, and the errors of the others."""
-    reader = animations.Reader(document, accessors)
     found: dict[int, Clip] = {}
     faults: list[AnimError] = []
     try:
@@ -78,6 +77,7 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
     except UnsupportedError as error:
         return {}, [error]
     with np.errstate(invalid="ignore"):
+        reader = animations.Reader(document, accessors)
         for i, animation in enumerate(json_array(document.json, "animations")):
             try:
                 found[i] = _clip(i, animation, reader)
