@@ -14,7 +14,6 @@ AnimError
 from __future__ import annotations
 
 import errno
-import numbers
 from typing import Any, Self
 
 _NO_MEMORY = (
@@ -117,6 +116,8 @@ def check_type(value: object, expected: type, name: str, *, help: str = "") -> N
 
 def check_number(value: object, name: str) -> None:
     """Raise ShapeError unless `value`, named `name`, is a real number; True and False are none."""
+    import numbers
+
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ShapeError(f"`{name}` is {value!r} (expected a number)")
 

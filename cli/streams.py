@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,6 @@ if TYPE_CHECKING:  # messages need no numpy
     from anim.arrays import Bytes
 
 
-@dataclass(eq=False)
 class StepStreams:
     """Bytes and lines that one step reads and writes.
 
@@ -22,13 +20,14 @@ class StepStreams:
     options, in order.
     """
 
-    name: str
-    input: Bytes
-    folder: Path
-    cores: int = 0
-    output: list[bytes] = field(default_factory=list)
-    messages: list[str] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)
+    def __init__(self, name: str, input: Bytes, folder: Path, cores: int = 0) -> None:
+        self.name = name
+        self.input = input
+        self.folder = folder
+        self.cores = cores
+        self.output: list[bytes] = []
+        self.messages: list[str] = []
+        self.files: list[Path] = []
 
 
 _streams: ContextVar[StepStreams | None] = ContextVar("streams", default=None)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
-from dataclasses import dataclass, field
 
 from anim.units import format_number
 from cli.streams import step_streams
@@ -16,16 +15,16 @@ DRY = " (dry run: nothing written)"
 MIN_LENGTH_M = 1e-11  # m; smaller lengths come from rounding
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Reporter:
     """Writer of messages by verbosity: errors and warnings only, one line, or all details.
 
     warnings: issued so far, for the list of this name in a JSON report.
     """
 
-    quiet: bool = False
-    verbose: bool = False
-    warnings: list[str] = field(default_factory=list, compare=False)
+    def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
+        self.quiet = quiet
+        self.verbose = verbose
+        self.warnings: list[str] = []
 
     def info(self, line: str) -> None:
         """Write a line to stderr unless quiet: cut if very long, and one line whatever names of a file contain."""

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from pathlib import Path
 
 
-@dataclass(eq=False)
 class FileRecord:
     """Files that a command read and wrote, by the names that it used for them."""
 
-    inputs: dict[str, None] = field(default_factory=dict)  # in order
-    outputs: dict[str, None] = field(default_factory=dict)
+    def __init__(self) -> None:
+        self.inputs: dict[str, None] = {}  # in order
+        self.outputs: dict[str, None] = {}
 
 
 _record: ContextVar[FileRecord | None] = ContextVar("files", default=None)
