@@ -67,10 +67,10 @@ class CheckedFile:
         """World matrices of all nodes at rest (N, 3, 4)."""
         return rest_world(self.skeleton)
 
-    @cached_property
+    @property
     def motion(self) -> SkinMotion:
         """Motion of the scene's vertices."""
-        return SkinMotion(self.scene)
+        return self.contents.motion
 
     @cached_property
     def joints(self) -> list[int]:

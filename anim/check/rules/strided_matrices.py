@@ -8,14 +8,14 @@ from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule
 from anim.gltf.document import json_array
-from anim.gltf.validation.animation_storage import has_stride
+from anim.gltf.validation.animation_storage import with_stride
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the skins."""
     for i, skin in enumerate(json_array(file.json, "skins")):
         accessor = skin.get("inverseBindMatrices")
-        if accessor is not None and has_stride(file.json, accessor):
+        if accessor is not None and with_stride(file.json, [accessor]):
             yield file.in_skin(i, problem="inverse bind matrices are in a view with byteStride")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from anim.gltf.document import Json, json_array
 
 
@@ -27,11 +29,11 @@ def unbounded(json: Json, animation: Json) -> set[int]:
 
 def strided(json: Json, animation: Json) -> set[int]:
     """Return the indices of a clip's accessors in buffer views with byteStride (for vertex attributes)."""
-    named = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
-    return {n for n in named if has_stride(json, n)}
+    return with_stride(json, {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")})
 
 
-def has_stride(json: Json, accessor: int) -> bool:
-    """Return whether an accessor is in a buffer view with byteStride."""
-    about = json_array(json, "accessors")[accessor]
-    return "bufferView" in about and "byteStride" in json_array(json, "bufferViews")[about["bufferView"]]
+def with_stride(json: Json, numbers: Iterable[int]) -> set[int]:
+    """Return those of the accessors with these indices that are in a buffer view with byteStride."""
+    views = json_array(json, "bufferViews")
+    named = ((i, json["accessors"][i]) for i in numbers)
+    return {i for i, about in named if "bufferView" in about and "byteStride" in views[about["bufferView"]]}

@@ -9,6 +9,7 @@ from anim.gltf.document import Document, json_array
 from anim.gltf.io.lenient import BrokenFile
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
+from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene, Skeleton
 
 
@@ -16,7 +17,7 @@ class FileContents(NamedTuple):
     """Parts of a file that can be read. file_bytes: size of the file, for fractions of it.
 
     clips: by index. scene: None if vertices can't be read, for scene_error. faults: reasons for which other commands
-    refuse the file. lost_skins: indices of skins that can't be read.
+    refuse the file. lost_skins: indices of skins that can't be read. motion: of the scene's vertices, or of the nodes.
     """
 
     document: Document
@@ -28,6 +29,7 @@ class FileContents(NamedTuple):
     scene_error: AnimError | None
     faults: tuple[AnimError, ...]
     lost_skins: frozenset[int]
+    motion: SkinMotion
 
     @property
     def unreadable_clips(self) -> int:
@@ -52,6 +54,7 @@ def read_contents(document: Document, *, file_bytes: int, broken: BrokenFile | N
         scene_error,
         (*broken.faults, *unread) if broken else tuple(unread),
         broken.lost_skins if broken else frozenset(),
+        SkinMotion(scene or Scene(skeleton, ())),
     )
 
 

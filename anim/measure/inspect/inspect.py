@@ -38,9 +38,8 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
     ways = root_motion.root_motions(skeleton, looked_at, groups, figure=root_motion.figure_nodes(json, skeleton))
-    skin = SkinMotion(scene or Scene(skeleton, ()))
-    seams = _seams(skin, looked_at, groups)
-    measured_on = "skin" if skin.is_skin else "nodes"
+    seams = _seams(contents.motion, looked_at, groups)
+    measured_on = "skin" if contents.motion.is_skin else "nodes"
     costs, cost = storage_cost.storage_costs(document)
     stored_bytes = min(stored(document), cost.data)
     packed = stored_bytes / cost.data if cost.data else 1.0
@@ -107,6 +106,9 @@ def _clip(
     """The report of a clip, without index and bytes."""
     start, end = clip.start, clip.end
     counted = _with_end(clip, counted)
+    splines = np.array([track.interpolation is Interpolation.CUBICSPLINE for track in clip.tracks], np.bool_)
+    keys = np.array([len(track.values) for track in clip.tracks], np.int64)
+    interpolations = Counter([track.interpolation for track in clip.tracks])
     estimated = frame_rate.estimate_frame_rate(clip.key_times)
     return ClipReport(
         index=0,
@@ -114,9 +116,9 @@ def _clip(
         start_s=start,
         end_s=end,
         duration_s=end - start,
-        tracks=dict(Counter(track.path for track in clip.tracks)),
-        interpolations=dict(Counter(str(track.interpolation) for track in clip.tracks)),
-        keys=sum(len(track.times) for track in clip.tracks),
+        tracks=dict(Counter([track.path for track in clip.tracks])),
+        interpolations={str(name): count for name, count in interpolations.items()},
+        keys=int(keys.sum()),
         frame_rate_fps=estimated.fps if estimated else None,
         frame_rate_regular=estimated.regular if estimated else None,
         data_bytes=0,
@@ -125,11 +127,11 @@ def _clip(
         share=0.0,
         constant_tracks=int(counted.constant.sum()),
         no_effect_tracks=int(counted.no_effect.sum()),
-        repeating_tracks=_repeating(clip, counted),
+        repeating_tracks=_repeating(counted, keys > np.where(splines, 2, 1), has_end=end > start),
         redundant_keys=int(counted.redundant.sum()),
         non_unit_rotations=int(counted.non_unit.sum()),
         sign_flips=int(counted.flips.sum()),
-        sign_flips_in_splines=int(counted.flips[_splines(clip)].sum()),
+        sign_flips_in_splines=int(counted.flips[splines].sum()),
         wide_steps=int(counted.wide.sum()),
         widest_step_rad=float(counted.widest.max(initial=0.0)),
         seam_m=seam.gap,
@@ -138,14 +140,15 @@ def _clip(
         root=skeleton.display_name(way.root) if way.root >= 0 else "",
         root_distance_m=way.distance,
         root_speed_m_per_s=way.speed,
-        track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks) if tracks),
+        track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks if tracks else ())),
     )
 
 
 def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
     """The statistics, without a redundant key at the clip's end if only constant tracks have one there."""
     end = clip.end  # computed once: it is a search over all tracks
-    at_end = [i for i, track in enumerate(clip.tracks) if track.times[-1] == end]
+    last = {axis for axis in clip.time_axes if axis.times[-1] == end}
+    at_end = [i for i, track in enumerate(clip.tracks) if track.time_axis in last]
     if end <= clip.start or not all(counted.constant[i] and counted.redundant[i] for i in at_end):
         return counted
     redundant = counted.redundant.copy()
@@ -153,19 +156,14 @@ def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
     return counted._replace(redundant=redundant)
 
 
-def _splines(clip: Clip) -> Bools:
-    return np.array([track.interpolation is Interpolation.CUBICSPLINE for track in clip.tracks], np.bool_)
-
-
-def _repeating(clip: Clip, counted: TrackStats) -> int:
+def _repeating(counted: TrackStats, several: Bools, *, has_end: bool) -> int:
     """Number of constant tracks with unneeded keys.
 
+    several: tracks with more keys than a constant needs: one, of splines two. has_end: whether the clip has a duration.
     If no other track has a key at the clip's end, one of them is needed.
     """
-    needed = np.where(_splines(clip), 2, 1)  # keys; a spline needs two
-    several = np.array([len(track.times) for track in clip.tracks], np.int64) > needed
     count = int((counted.constant & ~counted.no_effect & several).sum())
-    return max(count - 1, 0) if counted.constant.all() and clip.end > clip.start else count
+    return max(count - 1, 0) if counted.constant.all() and has_end else count
 
 
 def _track(track: Track, skeleton: Skeleton, facts: TrackStats, i: int) -> TrackReport:

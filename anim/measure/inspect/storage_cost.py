@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as jsonlib
 from collections import Counter
+from itertools import chain
 from typing import NamedTuple
 
 from anim.gltf.document import Document, Json, json_array
@@ -41,11 +42,8 @@ def storage_costs(document: Document) -> tuple[list[StorageCost], StorageCost]:
         data, text, _ = used[numbers]
         alone.append(StorageCost(data, len(_text(animation)) + 1 + text))
         num_users[numbers] += 1
-    users_of_accessor: Counter[int] = Counter()
-    users_of_view: Counter[int] = Counter()
-    for numbers, count in num_users.items():
-        users_of_accessor.update(dict.fromkeys(numbers, count))
-        users_of_view.update(dict.fromkeys(used[numbers][2], count))
+    users_of_accessor = Counter(chain.from_iterable(numbers * count for numbers, count in num_users.items()))
+    users_of_view = Counter(chain.from_iterable([*used[numbers][2]] * count for numbers, count in num_users.items()))
     extra = [(accessors[i], count - 1) for i, count in users_of_accessor.items() if count > 1]
     repeated = [(views[i], count - 1) for i, count in users_of_view.items() if count > 1]
     data = sum(part.data for part in alone) - sum(_size(about) * times for about, times in extra)

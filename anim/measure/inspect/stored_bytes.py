@@ -16,17 +16,21 @@ def stored_bytes(document: Document) -> int:
     others = references_outside(content, range(len(clips))).accessors
     mine = {sampler[key] for sampler in samplers for key in ("input", "output")} - others
     accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
-    spans: dict[int, list[byte_ranges.Range]] = {}
-    compressed: dict[int, int] = {}
-    for number in mine:
-        for view in views_of(accessors[number]):
-            found = buffer_layout.compression(views[view])
-            if found is not None:
-                compressed[view] = found["byteLength"]
-            elif accessors[number].get("bufferView") == view:
-                spans.setdefault(view, []).append(_span(accessors[number]))
-    plain = sum(end - start for parts in spans.values() for start, end in byte_ranges.union(parts))
-    return plain + sum(compressed.values())
+    spans: dict[int, list[byte_ranges.Range]] = {}  # by view
+    for about in (accessors[number] for number in mine):
+        for view in views_of(about):
+            parts = spans.setdefault(view, [])
+            if about.get("bufferView") == view:
+                parts.append(_span(about))
+    return sum(_bytes_in(views[view], parts) for view, parts in spans.items())
+
+
+def _bytes_in(view: Json, parts: list[byte_ranges.Range]) -> int:
+    """Bytes of these parts of a view; of a compressed one all of its bytes as stored."""
+    found = buffer_layout.compression(view)
+    if found is not None:
+        return int(found["byteLength"])
+    return sum(end - start for start, end in (byte_ranges.union(parts) if len(parts) > 1 else parts))
 
 
 def _span(accessor: Json) -> byte_ranges.Range:
