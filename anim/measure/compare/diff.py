@@ -19,7 +19,7 @@ from anim.measure.equal_clips import first_equal
 from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.measure.error.sample_times import FPS, dense_times
 from anim.measure.error.statistics import Peak, Statistics, statistics
-from anim.model import Clip, Scene
+from anim.model import Clip, Scene, Track
 from anim.sampling.players import parse_pair
 
 END_TOLERANCE_S = 1e-6  # smaller differences of clip ends come from rounding
@@ -210,21 +210,22 @@ def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player
 
 def _lost(ruler: ErrorMetric, before: Clip, after: Clip) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Targets of tracks of only the old clip, and of only the new one."""
-    one, other = dict(_targets(ruler, before, is_old=True)), dict(_targets(ruler, after, is_old=False))
-    missing = tuple(name for key, name in one.items() if key not in other)
-    return missing, tuple(name for key, name in other.items() if key not in one)
+    nodes = ruler.pairs.nodes.tolist()
+    one = {_target(track, nodes[track.node] if track.node is not None else -1): track for track in before.tracks}
+    other = {_target(track, track.node if track.node is not None else -1): track for track in after.tracks}
+    missing = tuple(_label(ruler.scene, track) for key, track in one.items() if key not in other)
+    return missing, tuple(_label(ruler.other, track) for key, track in other.items() if key not in one)
 
 
-def _targets(ruler: ErrorMetric, clip: Clip, *, is_old: bool) -> Iterator[tuple[tuple[object, str], tuple[str, str]]]:
-    """Target of each track: comparable between both scenes, and for reports."""
-    scene = ruler.scene if is_old else ruler.other
-    for track in clip.tracks:
-        if track.node is None:
-            yield (track.pointer, track.path), (track.pointer or "", track.path)
-        else:
-            node = int(ruler.pairs.nodes[track.node]) if is_old else track.node
-            key = node if node >= 0 else ("unmatched", track.node)
-            yield (key, track.path), (scene.skeleton.display_name(track.node), track.path)
+def _target(track: Track, node: int) -> tuple[object, str]:
+    """Target of a track, comparable between both scenes. node: in the second one, −1 for none."""
+    if track.node is None:
+        return track.pointer, track.path
+    return node if node >= 0 else ("unmatched", track.node), track.path
+
+
+def _label(scene: Scene, track: Track) -> tuple[str, str]:
+    return track.pointer or "" if track.node is None else scene.skeleton.display_name(track.node), track.path
 
 
 def _names(scene: Scene, nodes: Ints) -> tuple[str, ...]:
