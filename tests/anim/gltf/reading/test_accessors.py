@@ -31,6 +31,31 @@ def test_every_form_has_the_values_that_it_says_it_has(index: int) -> None:
     np.testing.assert_array_equal(Accessors(DOCUMENT).floats(index), expected.reshape(about["count"], -1))
 
 
+def test_plain_floats_are_those_read_one_by_one() -> None:
+    accessors = Accessors(DOCUMENT)
+    found = accessors.plain_floats([*DESCRIBED, *DESCRIBED])
+    forms = {DOCUMENT.json["accessors"][i]["extras"]["form"] for i in DESCRIBED if i not in found}
+    assert found
+    assert forms  # of integers, matrices, sparse and strided ones
+    for index, values in found.items():
+        np.testing.assert_array_equal(values, accessors.floats(index))
+        assert values.shape == accessors.floats(index).shape
+        assert not values.flags.writeable
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_plain_floats_leaves_numbers_that_are_not_finite_to_others(number: float) -> None:
+    document = _over(np.array([1, number], "<f4").tobytes(), count=2)
+    assert Accessors(document).plain_floats([0]) == {}
+    with pytest.raises(FormatError, match="holds NaN or infinity"):
+        Accessors(document).floats(0)
+
+
+def test_plain_floats_leaves_replaced_values_out() -> None:
+    assert list(Accessors(_points()).plain_floats([0])) == [0]
+    assert Accessors(_points()).over({0: np.zeros((2, 3))}).plain_floats([0]) == {}
+
+
 def test_matrices_are_transposed_from_columns_to_rows() -> None:
     index = next(i for i in DESCRIBED if DOCUMENT.json["accessors"][i]["extras"]["form"].startswith("MAT4 of f4"))
     expected = DOCUMENT.json["accessors"][index]["extras"]["expected"]
