@@ -93,6 +93,8 @@ class Command(Parsing, TyperCommand):
         with depfile.record_files() as record:
             code = super().invoke(ctx)
         if not code and not ctx.params.get("dry_run"):
+            if os.path.realpath(path) in map(os.path.realpath, record.inputs):
+                raise UsageError(f"{path}: --depfile would replace an input (expected another file)")
             outputs = list(record.outputs) if "{" in output else [output]
             documents.write_text(depfile.rule(outputs or [output], list(record.inputs)), path)
         return code

@@ -17,6 +17,7 @@ from anim.check.finding import Severity
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.selection import TARGETS, rule_of
 from anim.errors import AnimError, FormatError
+from anim.units import plural
 from cli import errors
 from cli.errors import CheckError, UsageError
 from cli.io import documents
@@ -150,6 +151,8 @@ def command(
         return errors.DONE
     if known is not None and write_known is not None:
         raise UsageError("--baseline and --write-baseline can't be combined")
+    if write_known is not None and write_known != documents.PIPE:
+        documents.check_file(write_known)
     expected = None if known is None else _load_baseline(known)
     reporter = Reporter(quiet)
     rules = [[word for each in option or () for word in each.split(",")] for option in (select, extend, ignore)]
@@ -170,10 +173,12 @@ def command(
         documents.write_text(check_report.budget_table(checker.headroom))
         return _worst(checker.refused, len(checker.files))
     if write_known is not None:
+        if os.path.realpath(write_known) in map(os.path.realpath, checker.files):
+            raise UsageError(f"{write_known}: --write-baseline would replace a checked file (expected another file)")
         kept = _unchecked(_written_baseline(write_known), checker.files, write_known)
         documents.write_text(baseline.dump(checker.found, _relative_to(write_known), kept), write_known)
         others = f", {kept.total()} kept of files that were not checked" if kept else ""
-        reporter.info(f"{write_known}  {len(checker.found)} findings{others}")
+        reporter.info(f"{write_known}  {plural(len(checker.found), 'finding')}{others}")
         return _worst(checker.refused, len(checker.files))
     report = CheckReport(checker.files, checker.found, checker.refused, checker.limits)
     if expected is not None and known is not None:

@@ -64,6 +64,8 @@ def command(
     began = time.perf_counter()
     if input == other == documents.PIPE:
         raise UsageError("IN and B can't both be stdin")
+    if other is not None and other.endswith(".html"):
+        raise UsageError(f"B is '{other}' (expected a file to compare with)", help=f"--out {other} writes the page")
     check_page(documents.PIPE if output is None else output)
     shows = _shows(show)
     first = open_page_file(input, reporter)

@@ -39,7 +39,7 @@ LINES = (
     "bake IN out.npz --fps 4 --rigid --clip #0",
     "bake IN {clip}.npz --fps 4 --rigid",
     "plot IN out.png --clip #0",
-    "view IN out.html",
+    "view IN -o out.html",
     "render IN out.png --frames 2 --clip #0",
     "collapse IN",
     "diff IN IN",

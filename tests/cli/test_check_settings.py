@@ -9,6 +9,7 @@ import pytest
 
 from tests.cli.checking import codes
 from tests.cli.conftest import Call
+from tests.cli.running import refusal
 
 
 def test_settings_come_from_the_nearest_file_upwards(folder: Path, call: Call) -> None:
@@ -47,6 +48,15 @@ def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> Non
     (folder / "gltf-anim.toml").write_text("[check]\n")
     (folder / "pyproject.toml").write_text("[tool.gltf-anim]\n")
     assert "expected one of them" in call("check", "noop.glb").err
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"), [("crowd/../noop.glb", "would replace a checked file"), ("none/a.json", "there is no folder")]
+)
+def test_a_baseline_replaces_no_checked_file(name: str, problem: str, folder: Path, call: Call) -> None:
+    before = (folder / "noop.glb").read_bytes()
+    assert problem in refusal(call("check", "noop.glb", "--write-baseline", name), 2)
+    assert (folder / "noop.glb").read_bytes() == before
 
 
 def test_only_what_is_new_counts_with_a_baseline(folder: Path, call: Call) -> None:

@@ -84,6 +84,14 @@ def test_wrong_names_are_refused(output: str, options: list[str], problem: str, 
     assert not (folder / "out.glb").exists()
 
 
+def test_an_input_is_not_replaced(folder: Path, call: Call) -> None:
+    before = (folder / "noop.glb").read_bytes()
+    run = call("retime", "noop.glb", "out.glb", "--speed", "2", "--depfile", f"{folder}/noop.glb")
+    assert (run.code, run.text) == (2, "")
+    assert "noop.glb: --depfile would replace an input (expected another file)" in run.err
+    assert (folder / "noop.glb").read_bytes() == before
+
+
 def test_none_is_written_without_an_output(folder: Path, call: Call) -> None:
     assert call("retime", "noop.glb", "out.glb", "--speed", "2", "--depfile", "x.d", "--dry-run").code == 0
     assert call("trim", "none.glb", "out.glb", "--to", "0.5", "--depfile", "x.d").code == 3

@@ -132,6 +132,7 @@ def _curves(call: Call, folder: Path) -> bytes:
     ("args", "words"),
     [
         (("-", "-"), "can't both be stdin"),
+        (("-", "page.html"), "B is 'page.html' (expected a file to compare with)"),
         (("-", "-o", "page.png"), "no .html file"),
         (("-", "-o", "a.html", "--show", "bones,fire"), "'fire'"),
     ],
