@@ -49,10 +49,11 @@ CODES[UsageError] = USAGE
 CODES[CheckError] = CHECK
 
 
-def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
+def run_guarded(job: Callable[[], Any], args: Sequence[str] = (), received: Sequence[int] = ()) -> int:
     """Run a job and return the exit code; errors are a line on stderr, tracebacks for internal ones only.
 
-    args: of the command line, for the hint on a file name that looks like an option.
+    args: of the command line, for the hint on a file name that looks like an option. received: signals; an error after
+    one is its consequence, in a package that discarded the exception of the signal.
     """
     try:
         code = job()
@@ -71,6 +72,8 @@ def run_guarded(job: Callable[[], Any], args: Sequence[str] = ()) -> int:
     except Exception as error:
         if (ended := _end_of(error)) is not None:
             return ended
+        if received:
+            return 128 + received[0]
         if is_out_of_memory(error):
             _print_error("out of memory", "")
             return UNSUPPORTED

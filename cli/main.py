@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar
 
@@ -23,6 +23,8 @@ from cli.typer_options import Command, Parsing, set_parsers
 
 PROGRAM = "gltf-anim"
 MATPLOTLIB_FOLDER = "MPLCONFIGDIR"
+# Variables that packages refuse to start with if they are wrong; no output depends on them.
+UNUSED_VARIABLES = ("MPLBACKEND", "NUMBA_NUM_THREADS", "SOURCE_DATE_EPOCH")
 
 
 class LazyGroup(Parsing, TyperGroup):
@@ -110,13 +112,15 @@ def main() -> None:
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends the process silently, as for other tools
     folder = os.environ.get(MATPLOTLIB_FOLDER)
+    for name in UNUSED_VARIABLES:
+        os.environ.pop(name, None)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrix products are small: more threads only cost time
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of packages: they are for programmers, and stderr is for messages
     with suppress(ImportError):  # raised again, and reported, when the command runs
         _import_command(sys.argv[1:])
     received = install_handlers()
-    code = run(sys.argv[1:])
+    code = run(sys.argv[1:], received)
     code = 128 + received[0] if received else code
     _remove_temporary_folder(folder)
     for stream in (sys.stdout, sys.stderr):
@@ -146,12 +150,17 @@ def _import_command(args: list[str]) -> None:
         importlib.import_module(f"{LazyGroup.package}.{name.replace('-', '_')}")
 
 
-def run(args: list[str]) -> int:
-    """Run one command line and return its exit code; errors are written to stderr."""
+def run(args: list[str], received: Sequence[int] = ()) -> int:
+    """Run one command line and return its exit code; errors are written to stderr.
+
+    received: numbers of the signals that came.
+    """
     from cli import errors
 
     command = typer.main.get_command(app)
-    return errors.run_guarded(lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False), args)
+    return errors.run_guarded(
+        lambda: command.main(args or ["--help"], prog_name=PROGRAM, standalone_mode=False), args, received
+    )
 
 
 if __name__ == "__main__":

@@ -95,3 +95,11 @@ def test_a_plot_leaves_nothing_behind_where_the_home_can_not_be_written(folder: 
     code, _, err = run(f"plot walk.glb {tmp_path / 'a.svg'} -q", folder, {"HOME": "/proc/1", "TMPDIR": str(tmp_path)})
     assert (code, err) == (0, b"")
     assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]
+
+
+@pytest.mark.slow
+def test_variables_of_packages_are_not_asked(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    wrong: dict[str, str | None] = {"MPLBACKEND": "x", "NUMBA_NUM_THREADS": "0", "SOURCE_DATE_EPOCH": "x"}
+    assert run(f"plot walk.glb {tmp_path / 'a.svg'} -q", folder, wrong)[0] == 0
+    assert run(f"bake walk.glb {tmp_path / 'a.usda'} --clip #0 --fps 4 -q", folder, wrong)[0] == 0

@@ -29,11 +29,12 @@ def test_a_signal_during_imports_ends_silently(where: str, number: signal.Signal
 
 
 @pytest.mark.parametrize(("number", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
-@pytest.mark.parametrize("fate", ["turned into another error", "swallowed", "passed on"])
+@pytest.mark.parametrize("fate", ["turned into another error", "swallowed", "lost before an error", "passed on"])
 def test_a_signal_ends_the_run_whatever_a_package_makes_of_it(fate: str, number: str, code: int) -> None:
     catch = {
         "turned into another error": "except BaseException as e: raise RuntimeError('in __set_name__') from e",
         "swallowed": "except BaseException: pass",
+        "lost before an error": "except BaseException: pass\n        raise RuntimeError('no compiled object yet')",
         "passed on": "finally: pass",
     }[fate]
     run = python(f"""
@@ -42,12 +43,12 @@ sys.argv = ["gltf-anim", "convert", "x.glb"]
 from cli import entry_point, main
 from cli.commands import convert
 import os, signal
-def job(args):
+def job(args, received):
     from cli import errors
     def fails():
         try: os.kill(os.getpid(), signal.{number})
         {catch}
-    return errors.run_guarded(fails)
+    return errors.run_guarded(fails, args, received)
 main.run = job
 entry_point.main()
 """)
