@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from anim.arrays import AnyArray, Floats, Ints
 from anim.errors import RangeError
 from anim.show.filmstrip import captions, palette
-from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, fit_camera
+from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, Camera, fit_camera
 from anim.show.filmstrip.captions import FAINT, LINE
 from anim.show.filmstrip.renderer import SceneView, mark_spacing, render_frame, setup_view, to_srgb, translate_view
 from anim.show.filmstrip.root_path import RootPath
@@ -85,8 +85,8 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     Rows of one clip are wrapped together, so that methods can be compared at the same times.
     Raises RangeError for pictures of less than 32 or more than 4096 pixels.
     """
-    scenery = _setup_scene(extent, look)
-    width, height = scenery.camera.width, scenery.camera.height
+    camera = _fit_camera(extent, look)
+    width, height = camera.width, camera.height
     most, header = _max_extent(rows), _header_height(rows, title)
     clips = [list(each) for _, each in groupby(rows, key=lambda row: row.clip)]
     per_line, pitch = _grid(width)
@@ -96,6 +96,7 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
         header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP, across + 2 * EDGE
     )
     captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
+    scenery = _setup_scene(extent, camera)
     top = header
     for clip in clips:
         words = captions.wrap_text(clip[0].heading, across) if clip[0].heading else []
@@ -168,8 +169,8 @@ def animate_frames(
 
     Raises RangeError for more than MAX_PIXELS.
     """
-    scenery = _setup_scene(extent, look)
-    width, height = scenery.camera.width, scenery.camera.height
+    camera = _fit_camera(extent, look)
+    width, height = camera.width, camera.height
     per_line, pitch = _grid(width)
     names = [captions.wrap_text(" ".join(filter(None, (row.heading, row.label))), pitch - GAP) for row in rows]
     name_lines = max(len(lines) for lines in names) if any(lines != [""] for lines in names) else 0
@@ -179,6 +180,7 @@ def animate_frames(
     tall = header + -(-len(rows) // columns) * cell - CLIP_SPACING_PX + LINE + EDGE
     times, most = film_times(rows), _max_extent(rows)
     _check_size(tall, across, len(times))
+    scenery = _setup_scene(extent, camera)
     frames = [_repeat_last(_frames(row, scenery, most, look)) for row in rows]
     for time, *pictures in zip(times, *frames, strict=False):
         sheet = _blank_image(tall, across)
@@ -237,12 +239,15 @@ def _check_size(height: int, width: int, frames: int) -> None:
         )
 
 
-def _setup_scene(extent: Extent, look: ViewOptions) -> SceneView:
+def _fit_camera(extent: Extent, look: ViewOptions) -> Camera:
     if not 32 <= look.height <= 4096:
         raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
     points = extent.points.reshape(-1, 3)
-    camera = fit_camera(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
-    return setup_view(camera, points, extent.ground)
+    return fit_camera(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
+
+
+def _setup_scene(extent: Extent, camera: Camera) -> SceneView:
+    return setup_view(camera, extent.points.reshape(-1, 3), extent.ground)
 
 
 def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> Iterator[Image]:

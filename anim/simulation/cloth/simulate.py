@@ -10,6 +10,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError, UnstableError
+from anim.memory import MemoryBudget
 from anim.model import Clip, FrameChunk, Scene, VertexCache
 from anim.simulation.cloth.driver import ClothDriver, bake_vertices
 from anim.simulation.cloth.elongation import ElongationRecord, join_elongations, measure_elongation
@@ -19,6 +20,7 @@ from anim.simulation.cloth.options import SOLVERS, ClothOptions
 from anim.simulation.cloth.report import ClothFrames, make_failed_report, make_report
 from anim.simulation.cloth.runs import run_solver
 from anim.simulation.report import SimulationReport
+from anim.simulation.steps import Steps
 from anim.skinning.bake import prepare_bake
 
 MAX_SUBSTEPS = 80
@@ -36,15 +38,18 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     """Return the cloth of a mesh over a clip.
 
     node: of the mesh instance. pinned: (V,) vertices that follow the animation; all others are simulated.
-    Raises RangeError, NotFoundError for a mesh without edges or free points, UnstableError with a report.
+    Raises RangeError, NotFoundError for a mesh without edges or free points, UnsupportedError for more frames than the
+    limit of memory allows, UnstableError with a report.
     """
     if options.solver not in SOLVERS:
         raise RangeError(f"unknown `solver` '{options.solver}' (expected {', '.join(SOLVERS)})")
     options = _with_period(options) if options.loop else options
+    Steps(1 / (options.fps * options.substeps), options.duration, options.warm_up)  # raises RangeError for too many
     baker = prepare_bake(scene, rigid=True, nodes=[node])
     template = baker.bake(Clip("", ()), times=np.zeros(1))
     start = np.concatenate([chunk.positions for chunk in template.chunks()])[0].astype(np.float64)
     model = build_cloth(start, template.faces, pinned, options.fabric, self_collision=options.self_collision)
+    MemoryBudget(0).check(options.num_frames * (8 * 3 * len(model.masses) + 4 * 3 * len(start)))
     followers = model.topology.first_vertex[model.pinned]
     pinned_baker = bake_vertices(scene, node, followers)
     driver = ClothDriver(baker, pinned_baker, clip, scene, options.obstacles, options.environment.period)

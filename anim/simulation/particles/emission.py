@@ -84,7 +84,7 @@ def emit(
     last = end if emitter.end is None else min(end, emitter.end)
     count = emitter.burst + int(np.ceil(max(last - first, 0) * emitter.rate - 1e-9))
     if count * len(emitter.nodes) > MAX_PARTICLES:
-        raise RangeError(f"{count * len(emitter.nodes)} particles (limit {MAX_PARTICLES})")
+        raise RangeError(f"{count * len(emitter.nodes):.6g} particles (limit {MAX_PARTICLES})")
     times = np.concatenate(
         [np.full(emitter.burst, first), first + np.arange(count - emitter.burst) / (emitter.rate or 1)]
     )
