@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import zipfile
 from pathlib import Path
@@ -185,6 +186,13 @@ def test_onto_a_source(call: Call, source: Path) -> None:
     assert call("bake", source, baked, "--clip", "bend").code == 0
     assert call("convert-cache", cache, onto, "--onto", source).code == 0
     assert onto.read_bytes() == baked.read_bytes()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names of other systems are text")
+def test_an_image_whose_name_is_no_text_is_refused(call: Call, source: Path) -> None:
+    run = call("bake", source, source.with_name("\udcff.usda"), "--clip", "#0")
+    assert (run.code, "no UTF-8" in run.err) == (4, True)
+    assert list(source.parent.iterdir()) == [source]
 
 
 def test_a_texture_that_usd_cannot_show(call: Call, source: Path) -> None:

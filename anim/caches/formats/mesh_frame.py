@@ -47,6 +47,8 @@ def write(still: MeshFrame, ending: str) -> bytes:
         return remark.ljust(80)[:80] + data[80:]
     if ending == ".obj":
         text = export_obj(mesh, include_normals=normals is not None, include_texture=False, digits=OBJ_DIGITS)
+        if not len(still.faces):
+            text = text.replace("\nf \n", "\n")  # one face without vertices
         if still.materials is not None:
             text = _with_materials(text, still.materials)
         return _with_comment(text.encode(), b"# ", remark)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
+from anim.caches.formats.texture_coordinates import texture_coordinates
 from anim.caches.source_document.bake_source import baked_meshes
 from anim.caches.storage import Outputs, companion_name
 from anim.errors import FormatError
@@ -40,10 +41,11 @@ def mesh_materials(cache: VertexCache, document: Document, library: str) -> Mesh
             number = primitive.get("material")
             number = number if type(number) is int else -1
             texture = materials[number].texture if 0 <= number < len(materials) else None
-            index = primitive["attributes"].get(f"TEXCOORD_{0 if texture is None else texture.texcoord}")
+            found = texture_coordinates(
+                primitive, 0 if texture is None else texture.texcoord, accessors, span[1] - span[0]
+            )
             of_vertex[slice(*span)] = number
-            if index is not None and span[0] < span[1]:
-                found = accessors.floats(index)
+            if found is not None:
                 if texture is not None:
                     found = found @ texture.transform[:, :2].T + texture.transform[:, 2]
                 rows[slice(*span)] = np.stack((found[:, 0], 1 - found[:, 1]), axis=1)

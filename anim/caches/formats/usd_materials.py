@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Ints
+from anim.caches.formats.texture_coordinates import texture_coordinates
 from anim.caches.formats.usd_surface_inputs import TextureInput, constant_inputs, input_types, texture_inputs
 from anim.caches.source_document.bake_source import BakedMesh, Span, baked_meshes
 from anim.caches.source_document.lit_meshes import find_item
-from anim.errors import FormatError
+from anim.errors import FormatError, UnsupportedError
 from anim.gltf.document import Document, Json
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import TRANSFORM, image_data
@@ -156,6 +157,8 @@ class UsdMaterials:
             return ""
         is_second = any(number == source for number, _ in self._files)
         path = self._save_image(source, f"-{each.space.lower()}{ending}" if is_second else ending, data)
+        if path != path.encode(errors="replace").decode():  # bytes that are no text
+            raise UnsupportedError("an image beside it has a name that is no UTF-8, as names in USD are")
         self._files[source, each.space] = path
         return path
 
@@ -248,9 +251,9 @@ def _add_coordinates(
     accessors = Accessors(document)
     rows: AnyArray = np.zeros((num_vertices, 2), np.float32)
     for primitive, span in primitives:
-        index = primitive["attributes"].get(f"TEXCOORD_{number}")
-        if index is not None:
-            rows[slice(*span)] = accessors.floats(index)
+        found = texture_coordinates(primitive, number, accessors, span[1] - span[0])
+        if found is not None:
+            rows[slice(*span)] = found
             rows[slice(*span), 1] = 1 - rows[slice(*span), 1]
     kind, vertex = Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
     UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(st_name(number), kind, vertex).Set(Vt.Vec2fArray.FromNumpy(rows))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
+from anim.memory import MemoryBudget
 
 BLOCK_VALUES = 1 << 22  # values processed at a time, in float64
 MIN_EIGENVALUE_FRACTION = 1e-15  # fraction of the largest eigenvalue; smaller ones are noise
@@ -26,9 +27,10 @@ def fit_basis(positions: AnyArray, limit: float, *, most: int) -> PcaBasis | Non
     """Return the fewest shapes within `limit` m for every vertex of every frame; None above `most`.
 
     positions: (F, V, 3). Computed from the F×F products of frames, with half of float64's digits: sufficient for limits
-    above 1e-6 of the extent. Each shape's maximum displacement is 1 m, for integer storage. Memory: the shapes and a
-    block of vertices.
+    above 1e-6 of the extent. Each shape's maximum displacement is 1 m, for integer storage. Memory: the products, the
+    shapes and a block of vertices. Raises UnsupportedError for products above the limit of memory.
     """
+    MemoryBudget(0).check(8 * len(positions) ** 2)
     products = np.zeros((len(positions), len(positions)))
     for _, rows, _ in _blocks(positions):
         products += rows @ rows.T

@@ -15,7 +15,7 @@ from anim.caches.storage import Memory
 from anim.caches.transforms.pca import fit_basis
 from anim.caches.transforms.resample import reduce_frames
 from anim.caches.transforms.up_axis import to_up_axis
-from anim.errors import FormatError, RangeError
+from anim.errors import FormatError, RangeError, UnsupportedError
 from anim.model import VertexCache
 from anim.model.vertex_cache import from_arrays
 from tests.anim.caches.making import FACES, cache, normals_of, off, opened, positions_of, smooth, written
@@ -101,6 +101,11 @@ def test_noise_keeps_every_frame() -> None:
     assert fit_basis(positions_of(source), 1e-3, most=3) is None
     found = fit_basis(positions_of(source), 0.0, most=12)
     assert found is None or len(found.shapes) == 11  # a mean and eleven
+
+
+def test_more_frames_than_memory_holds_products_of_are_refused() -> None:
+    with pytest.raises(UnsupportedError, match="would take 80 GB"):
+        fit_basis(np.zeros((100_000, 1, 3), np.float32), 1e-3, most=3)
 
 
 @pytest.mark.parametrize("quantize", [False, True])
