@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fixtures.broken.pieces import buffered, text
+from fixtures.broken.pieces import animated, buffered, text
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal, shell
 from tests.fixtures.reading import split
@@ -191,3 +191,28 @@ def test_stdout_by_its_path_takes_what_stdout_takes(way: str, tmp_path: Path) ->
     shell(f"(echo hi; gltf-anim convert in.glb /dev/stdout -q) {way}", tmp_path).product()
     shell("gltf-anim convert in.glb - -q > plain", tmp_path).product()
     assert (tmp_path / "out").read_bytes() == b"hi\n" + (tmp_path / "plain").read_bytes()
+
+
+def test_a_compressed_view_without_its_object_is_refused(call: Call, tmp_path: Path) -> None:
+    document = animated()
+    document["bufferViews"][1]["extensions"] = {"EXT_meshopt_compression": None}
+    (tmp_path / "in.gltf").write_bytes(text(document))
+    run = call("resample", tmp_path / "in.gltf", tmp_path / "out.glb", "--fps", "4")
+    assert "bufferViews[1].extensions.meshopt: is no object" in refusal(run, 3)
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "usda"])
+def test_texture_coordinates_of_three_components_are_refused(ending: str, call: Call, tmp_path: Path) -> None:
+    document, blob = split(built("morph_cube"))
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = attributes["POSITION"]
+    (tmp_path / "in.glb").write_bytes(pack(document, blob))
+    run = call("bake", tmp_path / "in.glb", tmp_path / f"out.{ending}", "--rigid", "--fps", "1", "--clip", "#0")
+    assert "TEXCOORD_0 has shape" in refusal(run, 3)
+
+
+def test_an_obj_without_faces_has_no_line_of_one(call: Call, tmp_path: Path) -> None:
+    none = np.zeros((0, 3), np.int64)
+    np.savez(tmp_path / "in.npz", positions=np.zeros((1, 3, 3), np.float32), times=np.zeros(1), faces=none)
+    call("convert-cache", tmp_path / "in.npz", tmp_path / "out.obj").product()
+    assert not [line for line in (tmp_path / "out.obj").read_text().splitlines() if line.startswith("f")]

@@ -49,13 +49,18 @@ def element_size(component_type: int, kind: str) -> int:
 
 
 def compression(view: Json) -> Json | None:
-    """Return the meshopt extension object of a view, None for an uncompressed one."""
+    """Return the meshopt extension object of a view, None for an uncompressed one.
+
+    Raises FormatError for null instead of an object.
+    """
     extensions = view.get("extensions")
     if not extensions:
         return None
     for name in MESHOPT:
         if name in extensions:
-            found: Json = extensions[name]
+            found: Json | None = extensions[name]
+            if found is None:
+                raise FormatError("is no object", where="extensions.meshopt")
             return found
     return None
 
