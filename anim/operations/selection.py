@@ -100,5 +100,6 @@ def _suggestion(glob: str, names: Iterable[str], what: str) -> str:
     return f"the {_plural(what)} are {listed}{f' and {len(known) - 8} more' if len(known) > 8 else ''}"
 
 
-def _plural(noun: str) -> str:
-    return f"{noun}es" if noun.endswith("sh") else f"{noun}s"
+def _plural(nouns: str) -> str:
+    """Plural of a noun, or of several: "mesh or node" → "meshes or nodes"."""
+    return " or ".join(f"{noun}es" if noun.endswith("sh") else f"{noun}s" for noun in nouns.split(" or "))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -115,7 +116,9 @@ def _result(path: str, found: Finding, rule: int, seen: Counter[str]) -> dict[st
 
 def _location(path: str) -> dict[str, Any]:
     region = {"startLine": 1}
-    return {"physicalLocation": {"artifactLocation": {"uri": quote(path.replace("\\", "/"))}, "region": region}}
+    return {
+        "physicalLocation": {"artifactLocation": {"uri": quote(os.fsencode(path.replace("\\", "/")))}, "region": region}
+    }
 
 
 def as_junit(report: CheckReport) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -63,6 +64,13 @@ def test_sarif_has_a_region_and_an_encoded_path_in_every_result(folder: Path, ca
         assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
     prints = [result["partialFingerprints"]["gltfAnim/v1"] for result in run["results"]]
     assert len(set(prints)) == len(prints)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names of other systems are text")
+def test_sarif_encodes_a_name_that_is_no_text(folder: Path, call: Call) -> None:
+    (folder / "noop.glb").rename(folder / "\udcff.glb")
+    results = call("check", "\udcff.glb", "--format", "sarif", "--fail-on", "info").json["runs"][0]["results"]
+    assert {each["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for each in results} == {"%FF.glb"}
 
 
 def test_junit_has_a_case_per_file(folder: Path, call: Call) -> None:

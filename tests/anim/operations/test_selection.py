@@ -7,7 +7,7 @@ import pytest
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
 from anim.model import Skeleton
-from anim.operations.selection import Selection
+from anim.operations.selection import Selection, match_names
 from tests.clips import clip, skeleton, track
 from tests.files import opened_fixture
 
@@ -63,6 +63,15 @@ def test_what_is_near_is_suggested() -> None:
     with pytest.raises(NotFoundError) as caught:
         Selection(clips=["zzz"]).chosen_clips([])
     assert caught.value.help == "the file has no clips"
+
+
+@pytest.mark.parametrize(
+    ("what", "listed"), [("mesh", "the meshes are 'a'"), ("mesh or node", "the meshes or nodes are 'a'")]
+)
+def test_names_are_listed_after_the_plural(what: str, listed: str) -> None:
+    with pytest.raises(NotFoundError) as found:
+        match_names(["zzz"], ["a"], what)
+    assert found.value.help == listed
 
 
 def test_nodes_are_named_or_numbered() -> None:
