@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 from anim.caches.options import ReadOptions
 from anim.caches.registry import CACHE_FORMATS
-from anim.errors import AnimError
+from anim.errors import AnimError, RangeError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.compare.vertex_distance import vertex_distance
@@ -90,6 +90,9 @@ def _motions(
 ) -> tuple[str, VertexMotion, VertexMotion]:
     """Name of the clip, and both motions."""
     if one.cache is not None and other.cache is not None:
+        if one.cache.vertex_count != other.cache.vertex_count:
+            counts = f"{one.cache.vertex_count} vertices and {other.cache.vertex_count}"
+            raise RangeError(f"{one.name} and {other.name} have {counts} (expected the same)")
         return "", cache_motion(one.cache), cache_motion(other.cache)
     if other.cache is not None and one.document is not None:
         clip = _clip(one, one.document, globs)

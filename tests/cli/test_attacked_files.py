@@ -216,3 +216,14 @@ def test_an_obj_without_faces_has_no_line_of_one(call: Call, tmp_path: Path) -> 
     np.savez(tmp_path / "in.npz", positions=np.zeros((1, 3, 3), np.float32), times=np.zeros(1), faces=none)
     call("convert-cache", tmp_path / "in.npz", tmp_path / "out.obj").product()
     assert not [line for line in (tmp_path / "out.obj").read_text().splitlines() if line.startswith("f")]
+
+
+def test_caches_of_other_numbers_of_vertices_are_not_compared(call: Call, tmp_path: Path) -> None:
+    for count in (0, 3, 4):
+        faces = np.arange(3 if count else 0).reshape(-1, 3)
+        positions = np.zeros((1, count, 3), np.float32)
+        np.savez(tmp_path / f"{count}.npz", positions=positions, times=np.zeros(1), faces=faces)
+    said = refusal(call("diff", tmp_path / "3.npz", tmp_path / "4.npz"), 2)
+    assert "have 3 vertices and 4 (expected the same)" in said
+    assert "has no vertices" in refusal(call("diff", tmp_path / "0.npz", tmp_path / "3.npz"), 3)
+    assert "has no vertices" in refusal(call("convert-cache", tmp_path / "0.npz", tmp_path / "out.glb"), 3)

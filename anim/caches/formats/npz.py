@@ -51,6 +51,8 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
         shape = _shape(archive, "positions")
         if shape is None:
             raise FormatError("has no array 'positions' (expected positions, times and faces)")
+        if not shape[1]:
+            raise FormatError("has no vertices")
         present = tuple(name for name in DIRECTIONS if _shape(archive, name) is not None)
         for name in present:
             if _shape(archive, name) != shape:
