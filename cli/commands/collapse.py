@@ -10,10 +10,11 @@ import typer
 
 from anim.errors import NotFoundError
 from anim.gltf.reading import reader
+from anim.measure.equal_clips import first_equal
 from anim.measure.error.sample_times import grid_times
 from anim.operations.selection import Selection
 from anim.show.plots.collapse_plot import collapse_plot
-from anim.skinning.analysis.collapse import Comparison
+from anim.skinning.analysis.collapse import Comparison, MeshCollapse
 from anim.skinning.analysis.recommendations import CollapseFinding
 from cli.errors import UsageError
 from cli.io import documents, scenes
@@ -77,12 +78,13 @@ def command(
         announce_compiling(Reporter(quiet))
         comparison = Comparison(scene, methods=methods, bulge_clamp=bulge_clamp, nodes=meshes.nodes(scene, mesh))
         progress = Progress("collapse", len(numbers), shown=not quiet)
-        for done, i in enumerate(numbers):
-            times = grid_times(clips[i], fps=fps, start=clips[i].start)
-            found += [
-                CollapseFinding(i, reader.clip_name(clips[i].name, i), each)
-                for each in comparison.of(clips[i], times=times)
-            ]
+        by_clip: list[tuple[MeshCollapse, ...]] = []
+        for done, (i, first) in enumerate(zip(numbers, first_equal([(clips[i],) for i in numbers]), strict=True)):
+            if first == done:
+                by_clip.append(comparison.of(clips[i], times=grid_times(clips[i], fps=fps, start=clips[i].start)))
+            else:  # equal to an earlier clip
+                by_clip.append(by_clip[first])
+            found += [CollapseFinding(i, reader.clip_name(clips[i].name, i), each) for each in by_clip[-1]]
             progress(done + 1)
         progress.close()
     seen = CollapseReport(source.name, comparison.meshes, methods, bulge_clamp, fps, found, reporter.warnings)

@@ -11,6 +11,7 @@ from anim.measure.inspect import storage_cost
 from anim.show.plots import polylines, track_selection
 from anim.skinning import chunk_pipeline
 from anim.skinning.analysis.inbetween_error import InbetweenMetric
+from anim.skinning.bake import Baker
 from cli.io import documents
 from fixtures.broken.pieces import text
 from tests import many
@@ -73,6 +74,19 @@ def test_small_bakes_start_no_threads_and_measure_equal_clips_once(
     call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz", "--fps", "2").product()
     assert len(pools) > 0
     assert [(tmp_path / f"c{i}.npz").read_bytes() for i in range(5)] == alone
+
+
+def test_collapse_compares_equal_clips_once_and_bakes_each_method_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document = json.loads(many.skins(1)[20:].rstrip(b"\0 "))
+    clips = [{**document["animations"][0], "name": f"c{i}"} for i in range(5)]
+    (tmp_path / "in.gltf").write_bytes(text({**document, "animations": clips}))
+    bakes = count_calls(monkeypatch, Baker, "bake")
+    found = call("collapse", tmp_path / "in.gltf", "--format", "json").json["clips"]
+    assert len(bakes) == 2  # lbs, dqs
+    assert [each["clip"] for each in found] == [f"c{i}" for i in range(5)]
+    assert len({json.dumps(each["meshes"]) for each in found}) == 1
 
 
 def morphing_clips(count: int) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from anim.model import Clip, MeshInstance, Scene
 from anim.sampling.pose import PosedSkeleton
 from anim.skinning.analysis.collapse_index import CollapseIndices, CollapsePoint, collapse_indices
 from anim.skinning.analysis.equal_meshes import first_equal_mesh
-from anim.skinning.analysis.method_scores import BindMeasures, MethodScore, bind_measures, score_method
+from anim.skinning.analysis.method_scores import BindMeasures, MethodScore, bind_measures, score_methods
 from anim.skinning.bake import prepare_bake
 
 LOW_INDEX = 0.7  # collapse index below which skin looks pinched: that of 90° between two joints
@@ -92,18 +92,13 @@ class Comparison:
         self._subjects = [bind_measures(layer, rest) for layer in next(iter(self._bakers.values())).bind_each()]
         self.meshes = len(self._instances)
 
-    def of(
-        self, clip: Clip, *, times: Floats, progress: Callable[[int], None] = lambda methods: None
-    ) -> tuple[MeshCollapse, ...]:
-        """Return the collapse of each mesh in a clip. progress: called with the number of methods done."""
-        by_method = []
-        for i, (method, made) in enumerate(self._bakers.items()):
-            by_method.append(list(score_method(made, self._linear, method, self._subjects, clip, times)))
-            progress(i + 1)
+    def of(self, clip: Clip, *, times: Floats) -> tuple[MeshCollapse, ...]:
+        """Return the collapse of each mesh in a clip."""
+        scores = list(score_methods(self._bakers, self._linear, self._subjects, clip, times))
         indices = collapse_indices(self._scene.skeleton, [each.layer for each in self._subjects], clip, times)
         found = [
             self._mesh_collapse(each, seen, methods, times)
-            for each, seen, methods in zip(self._subjects, indices, zip(*by_method, strict=True), strict=True)
+            for each, seen, methods in zip(self._subjects, indices, scores, strict=True)
         ]
         return tuple(
             replace(found[i], mesh=self._name(instance), node=instance.node)

@@ -1,8 +1,8 @@
-"""Scores of one method in a clip: enclosed volume, and distance from the bones."""
+"""Scores of methods in a clip: enclosed volume, and distance from the bones."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,20 +73,27 @@ def bind_measures(layer: BoundMesh, rest: PosedSkeleton) -> BindMeasures:
     return BindMeasures(layer, faces if volume else faces[:0], volume, of, watched)
 
 
-def score_method(
-    baker: Baker, linear: Baker, method: str, subjects: list[BindMeasures], clip: Clip, times: Floats
-) -> Iterator[MethodScore]:
-    """Yield the score of each of the baker's meshes at `times` (F,) s of a clip. linear: the same by lbs."""
-    seen = [_Extremes(each, len(times)) for each in subjects]
-    sampler, limit = PoseSampler(baker.scene.skeleton, clip), model_size(baker)
-    chunks = baker.bake(clip, times=times).chunks()
-    alone = ((chunk, chunk) for chunk in chunks)
-    for chunk, other in alone if baker is linear else zip(chunks, linear.bake(clip, times=times).chunks(), strict=True):
-        frames = sampler.posed(times[chunk.first : chunk.first + len(chunk.positions)])
-        for each in seen:
-            each.add(chunk, other, frames)
-    for each in seen:
-        yield each.score(method, baker.scene.skeleton, times, limit)
+def score_methods(
+    bakers: Mapping[str, Baker], linear: Baker, subjects: list[BindMeasures], clip: Clip, times: Floats
+) -> Iterator[tuple[MethodScore, ...]]:
+    """Yield the scores of each mesh by each method at `times` (F,) s of a clip. linear: the baker by lbs."""
+    seen = [[_Extremes(each, len(times)) for _ in bakers] for each in subjects]
+    skeleton = linear.scene.skeleton
+    sampler = PoseSampler(skeleton, clip)
+    others = [baker.bake(clip, times=times).chunks() for baker in bakers.values() if baker is not linear]
+    for straight, *bent in zip(linear.bake(clip, times=times).chunks(), *others, strict=True):
+        frames = sampler.posed(times[straight.first : straight.first + len(straight.positions)])
+        rest = iter(bent)
+        chunks = [straight if baker is linear else next(rest) for baker in bakers.values()]
+        for subject, extremes in zip(subjects, seen, strict=True):
+            matrices = subject.layer.matrices(frames, slice(None))
+            for each, chunk in zip(extremes, chunks, strict=True):
+                each.add(chunk, straight, matrices)
+    for extremes in seen:
+        yield tuple(
+            each.score(method, skeleton, times, model_size(baker))
+            for each, (method, baker) in zip(extremes, bakers.items(), strict=True)
+        )
 
 
 class _Extremes:
@@ -99,10 +106,9 @@ class _Extremes:
         self._when = np.zeros(len(of.watched), np.int64)
         self._off = np.zeros(frames)
 
-    def add(self, chunk: FrameChunk, linear: FrameChunk, frames: PosedSkeleton) -> None:
-        """Add some frames. linear: the same frames by linear blending."""
+    def add(self, chunk: FrameChunk, linear: FrameChunk, matrices: Floats) -> None:
+        """Add some frames. linear: the same frames by linear blending. matrices: of the joints."""
         of, rig = self._of, self._of.layer.rig
-        matrices = of.layer.matrices(frames, slice(None))
         span = slice(of.layer.at, of.layer.at + len(rig.points))
         if chunk is not linear:
             distance = max_distance(chunk.positions[:, span], linear.positions[:, span])
