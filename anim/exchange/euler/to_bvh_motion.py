@@ -197,7 +197,8 @@ def _ends(skeleton: Skeleton, clip: Clip, among: Bools) -> list[int]:
 
 def _names(skeleton: Skeleton) -> list[str]:
     """Names of all nodes; braces become parentheses, since BVH uses them as delimiters."""
-    return unique([name.translate(str.maketrans(BRACES, "()")) for name in labels(skeleton)])
+    parentheses = str.maketrans(BRACES, "()")
+    return unique([name.translate(parentheses) for name in labels(skeleton)])
 
 
 def _rename_nodes(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:

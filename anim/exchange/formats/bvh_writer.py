@@ -57,12 +57,10 @@ def write(motion: EulerMotion) -> bytes:
             raise UnsupportedError("a BVH has intrinsic angles and no pivots", where=f"node '{node.name}'")
     axis = _frame_times(motion)
     times = axis.times
-    columns, text = _Columns(), io.BytesIO()  # encoded line by line: of the whole there is one copy
-
-    def put(lines: str) -> None:
-        text.write(f"{lines}\n".encode(errors="backslashreplace"))  # a lone surrogate, valid in JSON names
-
-    put("HIERARCHY")
+    columns, data = _Columns(), io.BytesIO()
+    # Encoded while it is written: of the whole there is one copy. A lone surrogate is valid in JSON names.
+    text = io.TextIOWrapper(data, "utf-8", "backslashreplace", newline="\n")
+    text.write("HIERARCHY\n")
     children: dict[int, list[int]] = {}
     for number, node in enumerate(motion.nodes):
         children.setdefault(node.parent, []).append(number)
@@ -72,21 +70,22 @@ def write(motion: EulerMotion) -> bytes:
         number, depth = waiting.pop()
         tabs = INDENTS[min(depth, MAX_INDENT)]
         if number < 0:
-            put(f"{tabs}}}")
+            text.write(f"{tabs}}}\n")
             continue
         node, below = motion.nodes[number], children.get(number, [])
-        put(_open_joint(node, offsets[number], tabs, is_leaf=not below))
+        text.write(_open_joint(node, offsets[number], tabs, is_leaf=not below))
         if not node.end:
             columns.add(node)
             waiting.append((-1, depth))  # its end
             waiting += [(child, depth + 1) for child in reversed(below)]
     step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1 / 30
-    put(f"MOTION\nFrames: {len(times)}\n" + f"Frame Time: {step:.9f}".rstrip("0"))
+    text.write(f"MOTION\nFrames: {len(times)}\n" + f"Frame Time: {step:.9f}".rstrip("0") + "\n")
     rows = np.round(columns.rows(axis), DECIMALS) + 0.0
-    pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1])
+    pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1]) + "\n"
     for row in rows:
-        put(pattern % tuple(row.tolist()))
-    return text.getvalue()
+        text.write(pattern % tuple(row.tolist()))
+    text.flush()
+    return data.getvalue()
 
 
 def _frame_times(motion: EulerMotion) -> TimeAxis:
@@ -103,11 +102,11 @@ def _frame_times(motion: EulerMotion) -> TimeAxis:
 def _open_joint(node: EulerNode, offset: str, tab: str, *, is_leaf: bool) -> str:
     """The lines of a node before its children; complete for an End Site and for a joint without children."""
     if node.end:
-        return f"{tab}End Site\n{tab}{{\n{tab}\tOFFSET {offset}\n{tab}}}"
+        return f"{tab}End Site\n{tab}{{\n{tab}\tOFFSET {offset}\n{tab}}}\n"
     channels = _channels(node.order, _has_position(node))
     kind = "JOINT" if node.parent >= 0 else "ROOT"
-    lines = f"{tab}{kind} {node.name}\n{tab}{{\n{tab}\tOFFSET {offset}\n{tab}\t{channels}"
-    return lines + f"\n{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET 0 0 0\n{tab}\t}}" if is_leaf else lines
+    lines = f"{tab}{kind} {node.name}\n{tab}{{\n{tab}\tOFFSET {offset}\n{tab}\t{channels}\n"
+    return lines + f"{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET 0 0 0\n{tab}\t}}\n" if is_leaf else lines
 
 
 @cache
