@@ -38,10 +38,10 @@ class Camera:
         y = self.height / 2 - self.scale * seen[..., 1] * near
         return np.stack((x, y, near), axis=-1)
 
-    def rays(self) -> Floats:
-        """Return the direction (height, width, 3) of the ray through each pixel, not normalized."""
+    def rays(self, rows: slice = slice(None)) -> Floats:
+        """Return the direction (height, width, 3) of the ray through each pixel of some rows, not normalized."""
         x = (np.arange(self.width) + 0.5 - self.width / 2) / self.scale
-        y = (self.height / 2 - np.arange(self.height) - 0.5) / self.scale
+        y = (self.height / 2 - np.arange(self.height)[rows] - 0.5) / self.scale
         right, up, back = self.axes
         rays: Floats = x[None, :, None] * right + y[:, None, None] * up - back
         return rays

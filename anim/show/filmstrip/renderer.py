@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from anim.show.filmstrip.surface import Surface
 
 SAMPLES = 3  # across and down in each pixel
+MAX_BAND_PIXELS = 1 << 18  # of the background, drawn at a time: 500 bytes each
 MAX_BAND_SAMPLES = 1 << 22  # samples drawn at a time, approximately: 60 bytes each
 # Linear light.
 SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
@@ -94,7 +95,8 @@ def render_frame(
     camera = stage.camera
     corners = _enlarge(camera, SAMPLES).project(positions)[faces]
     painted = np.concatenate((colors * _shade(camera, positions, faces)[:, None], np.zeros((1, 3))))
-    picture: Floats = stage.background * (1 - _shadow(stage, positions, faces, surface)[..., None] * (1 - SHADOW))
+    picture = stage.background.copy()
+    picture *= 1 - _shadow(stage, positions, faces, surface)[..., None] * (1 - SHADOW)
     rows = max(MAX_BAND_SAMPLES // (camera.width * SAMPLES**2), 1)
     for top in range(0, camera.height, rows):
         _paint(picture[top : top + rows], corners - (0, top * SAMPLES, 0), painted, marks, surface, tinted=tinted)
@@ -163,9 +165,20 @@ def _shade_some(camera: Camera, positions: Floats, faces: Ints) -> Floats:
 
 
 def _background(camera: Camera, ground: float, middle: Floats, reach: float, place: Floats) -> Floats:
-    share = np.linspace(0, 1, camera.height)[:, None, None]
-    image = np.broadcast_to(SKY * (1 - share) + EARTH * share, (camera.height, camera.width, 3)).copy()
-    rays = camera.rays()
+    picture = np.empty((camera.height, camera.width, 3))
+    step = max(MAX_BAND_PIXELS // camera.width, 1)
+    for top in range(0, camera.height, step):
+        first, end = max(top - 1, 0), min(top + step, camera.height)
+        band = _background_rows(camera, slice(first, end + 1), ground, middle, reach, place)
+        picture[top:end] = band[top - first : end - first]
+    return picture
+
+
+def _background_rows(camera: Camera, rows: slice, ground: float, middle: Floats, reach: float, place: Floats) -> Floats:
+    """Rows of the background; the first and the last one are exact at the picture's edges only."""
+    share = np.linspace(0, 1, camera.height)[rows, None, None]
+    image = SKY * (1 - share) + EARTH * share
+    rays = camera.rays(rows)
     down, height = -rays[..., 1], camera.eye[1] - ground
     is_ground = (down > 1e-6) & (height > 0)
     far = height / np.where(is_ground, down, 1)

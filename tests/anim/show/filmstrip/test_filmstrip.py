@@ -15,6 +15,7 @@ from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
 from anim.show.filmstrip import clips, renderer
 from anim.show.filmstrip import filmstrip as filmstrip_module
+from anim.show.filmstrip.camera import fit_camera
 from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
 from anim.show.filmstrip.frame_selection import FrameSelection
 from anim.skinning.bake import Baker
@@ -181,6 +182,15 @@ def test_pictures_are_drawn_in_bands_where_they_are_large(monkeypatch: pytest.Mo
     monkeypatch.setattr(renderer, "MAX_BAND_SAMPLES", 5000)
     _, bands = strip("biped", count=2)
     assert np.abs(once.astype(int) - bands).max() <= 1
+
+
+def test_the_background_is_the_same_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.array([[0, 0, 0], [1, 1, 1]], np.float64)
+    camera = fit_camera(points, height=64)
+    whole = renderer.setup_view(camera, points, 0.0).background
+    for rows in (1, 7):
+        monkeypatch.setattr(renderer, "MAX_BAND_PIXELS", rows * camera.width)
+        assert np.array_equal(renderer.setup_view(camera, points, 0.0).background, whole)
 
 
 def test_more_pixels_than_memory_should_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
