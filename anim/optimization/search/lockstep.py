@@ -49,19 +49,7 @@ class Found:
 
 def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[Found | None]:
     """Return what is found for each clip; None without a result within all bounds."""
-    sources = [
-        analyze_source(
-            context.skeleton,
-            each.clip,
-            each.free,
-            context.points,
-            context.answering,
-            reference=context.policy.reference,
-            chord_tolerance=CHORD_BOUND_FRACTION * each.bound,
-        )
-        for each in requests
-    ]
-    clips = StackedClips(context.skeleton, sources, context.points)
+    clips = StackedClips(context.skeleton, [_analyze(context, each) for each in requests], context.points)
     trials = [
         ClipTrials(source, context.coding, each.bound, each.droppable, each.shared)
         for source, each in zip(clips.sources, requests, strict=True)
@@ -77,6 +65,18 @@ def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Ef
     return [
         None if result is None else Found(source, result) for source, result in zip(clips.sources, best, strict=True)
     ]
+
+
+def _analyze(context: Context, request: SearchRequest) -> SourceMotion:
+    return analyze_source(
+        context.skeleton,
+        request.clip,
+        request.free,
+        context.points,
+        context.answering,
+        reference=context.policy.reference,
+        chord_tolerance=CHORD_BOUND_FRACTION * request.bound,
+    )
 
 
 def run_searches(batch: TrialBatch, searches: Sequence[Search]) -> list[TrialResult | None]:

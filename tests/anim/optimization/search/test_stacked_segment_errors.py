@@ -50,7 +50,7 @@ def test_keys_are_those_of_a_plain_loop() -> None:
         np.testing.assert_array_equal(keys, _plain(*asked))
 
 
-@pytest.mark.parametrize(("values", "calls"), [(1, len(SHAPES)), (9000, 3), (segment_errors.MAX_STACKED_VALUES, 1)])
+@pytest.mark.parametrize(("values", "calls"), [(1, len(SHAPES)), (20000, 3), (segment_errors.MAX_STACKED_VALUES, 1)])
 def test_tables_together_have_the_keys_of_each_alone(values: int, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also in parts, where all together would take too much memory."""
     asked = _asked()
