@@ -77,7 +77,10 @@ class SkinnedDisplacement:
     def lengths(self, group: int, frames: Ints) -> Floats:
         """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
         products = self._groups.products[group]
-        parts = np.array_split(products, len(products) * len(frames) // MAX_GROUP_VALUES + 1)
+        count = len(products) * len(frames) // MAX_GROUP_VALUES + 1
+        if count == 1:
+            return _lengths(self._products(products, group, frames))
+        parts = np.array_split(products, count)
         return np.concatenate([_lengths(self._products(part, group, frames)) for part in parts])
 
     def _products(self, products: Floats, group: int, frames: Ints) -> Floats:
@@ -203,7 +206,10 @@ def lengths(field: DisplacementField, group: int, frames: Ints) -> Floats:
 def _lengths(vectors: Floats) -> Floats:
     """Lengths (V, f) of vectors (V, 3, f), which are overwritten."""
     vectors *= vectors
-    return np.asarray(np.sqrt(vectors.sum(axis=1)))
+    squares = vectors[:, 0]  # added one by one, in half of the time of a sum over three
+    squares += vectors[:, 1]
+    squares += vectors[:, 2]
+    return np.asarray(np.sqrt(squares, out=squares))
 
 
 def lengths_by_group(field: DisplacementField, groups: int, frames: Ints) -> Iterator[Floats]:
