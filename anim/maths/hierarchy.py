@@ -92,9 +92,10 @@ def with_ancestors(parents: Ints, chosen: Bools) -> Bools:
 
 def _by_level(local: Floats, parents: Ints, levels: Sequence[Ints], compose: Compose, found: Floats) -> None:
     for depth, nodes in enumerate(levels):
-        at = _index(nodes)
+        at = slice(int(nodes[0]), int(nodes[-1]) + 1) if _are_neighbors(nodes) else nodes  # a slice copies nothing
         if depth:
-            found[at] = compose(found[_index(parents[nodes])], local[at])
+            above = parents[nodes]
+            found[at] = compose(found[above[0] : above[0] + 1] if len(above) == 1 else found[above], local[at])
         elif found is not local:
             found[at] = local[at]
 
@@ -116,9 +117,9 @@ def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: C
         found[nodes] = compose(found[above[nodes]], found[nodes])
 
 
-def _index(nodes: Ints) -> Ints | slice:
-    """The nodes as an index; a single one as a slice, which copies nothing."""
-    return nodes if len(nodes) != 1 else slice(int(nodes[0]), int(nodes[0]) + 1)
+def _are_neighbors(nodes: Ints) -> bool:
+    """Return whether nodes follow each other in steps of one."""
+    return len(nodes) > 0 and bool((np.diff(nodes) == 1).all())
 
 
 def _depth_first(parents: Ints) -> list[int]:

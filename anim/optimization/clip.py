@@ -13,7 +13,7 @@ from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track, parse_weig
 from anim.model.track import share_time_axes
 from anim.optimization.options import Drop
 from anim.optimization.search.context import Context
-from anim.optimization.search.lockstep import Found, SearchRequest
+from anim.optimization.search.lockstep import SearchRequest, SearchResult
 from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
 from anim.optimization.search.source_motion import PATHS, SourceMotion, key_grid
 from anim.optimization.tracks import clip_ends, key_reduction, morph_weights, quantization
@@ -44,7 +44,7 @@ class Task:
     extra: frozenset[tuple[int, int]] = frozenset()
 
 
-Solving: TypeAlias = Generator[SearchRequest, Found | None, Solution | None]
+Solving: TypeAlias = Generator[SearchRequest, SearchResult | None, Solution | None]
 
 
 def solve(context: Context, task: Task) -> Solving:
@@ -212,7 +212,7 @@ class _TrackSorter:
 
     def _search(
         self, free: Sequence[int]
-    ) -> Generator[SearchRequest, Found | None, dict[int, tuple[Track, EncodedKeys]] | None]:
+    ) -> Generator[SearchRequest, SearchResult | None, dict[int, tuple[Track, EncodedKeys]] | None]:
         """Search the free tracks; None without a solution. Tracks that the search drops are absent."""
         if not free:
             return {}

@@ -15,7 +15,7 @@ from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Effort, Request
 from anim.optimization.search.context import Context, build_context
-from anim.optimization.search.lockstep import Found, SearchRequest, search_clips
+from anim.optimization.search.lockstep import SearchRequest, SearchResult, search_clips
 from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
@@ -30,7 +30,7 @@ UNVERIFIED = Verification(MotionError(0.0, 0.0, "", "", 0), "", None, 0.0)
 
 
 Result = TypeVar("Result")
-Optimizing: TypeAlias = Generator[tuple[Effort, SearchRequest], "Found | None", Result]
+Optimizing: TypeAlias = Generator[tuple[Effort, SearchRequest], "SearchResult | None", Result]
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +146,11 @@ def optimize_clips(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) 
     return [found[n] for n in range(len(steps))]
 
 
-def _search(optimizer: ClipOptimizer, asked: Mapping[int, tuple[Effort, SearchRequest]]) -> dict[int, Found | None]:
+def _search(
+    optimizer: ClipOptimizer, asked: Mapping[int, tuple[Effort, SearchRequest]]
+) -> dict[int, SearchResult | None]:
     """The result of each search; those with equal efforts run side by side, on the points that any of them needs."""
-    answers: dict[int, Found | None] = {}
+    answers: dict[int, SearchResult | None] = {}
     for effort in dict.fromkeys(effort for effort, _ in asked.values()):
         some = {n: request for n, (one, request) in asked.items() if one == effort}
         extra = frozenset().union(*(request.extra for request in some.values()))
@@ -183,7 +185,7 @@ def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[C
 def _solve(context: Context, task: Task, effort: Effort) -> Optimizing[Solution | None]:
     """The solution of a clip, whose searches are yielded with their effort."""
     steps = solve(context, task)
-    answer: Found | None = None
+    answer: SearchResult | None = None
     while True:
         try:
             request = steps.send(answer)

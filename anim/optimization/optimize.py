@@ -19,6 +19,7 @@ from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
 from anim.optimization.search.plan import Solution
+from anim.optimization.search.source_motion import key_grid
 from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification
@@ -26,7 +27,9 @@ from anim.optimization.writing import changed_clips, write_solutions
 from anim.sampling.times import check_duration
 
 SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
-BATCH_KEYS = 300  # of the longest tracks of clips that are optimized side by side, in all
+BATCH_KEYS = 300  # times of possible keys, in all, of clips that are optimized side by side: twice as many are measured
+BATCH_MATRICES = 40_000  # those times × nodes
+BATCH_CLIPS = 16  # more would leave processes of `workers` without work
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,7 @@ def optimize(
         return reader.clip_label(clips[item[0]].name, item[0])
 
     found: dict[int, ClipResult] = {}
-    batches = _batches(distinct)
+    batches = _batches(distinct, len(scene.skeleton))
     with process_pool(min(workers, len(batches)), optimizer, start=start) as pool:
         results = pool.each(optimize_clips, batches, label=lambda batch: name(batch[0]), work=_work)
         for batch, some in zip(batches, results, strict=True):
@@ -116,26 +119,22 @@ def _first_equal(tasks: Sequence[tuple[int, Task]]) -> list[int]:
     ]
 
 
-def _batches(tasks: Sequence[tuple[int, Task]]) -> list[list[tuple[int, Task]]]:
-    """The tasks in batches that are optimized side by side, of clips with about as many keys, the longest first.
+def _batches(tasks: Sequence[tuple[int, Task]], nodes: int) -> list[list[tuple[int, Task]]]:
+    """The tasks in batches that are optimized side by side, of clips with about as many times, the longest first.
 
     They depend on the clips alone, and not on the number of processes, so that the result does not either.
     """
+    lengths = [len(key_grid(task.clip.tracks)) for _, task in tasks]
+    most = min(BATCH_KEYS, BATCH_MATRICES // max(nodes, 1))
     batches: list[list[tuple[int, Task]]] = []
-    room = 0
-    for task in sorted(tasks, key=lambda task: (-_length(task[1].clip), task[0])):
-        length = _length(task[1].clip)
-        if not batches or room < length:
+    room = longest = 0
+    for n in sorted(range(len(tasks)), key=lambda n: (-lengths[n], tasks[n][0])):
+        if not batches or room < longest or len(batches[-1]) == BATCH_CLIPS:
             batches.append([])
-            room = BATCH_KEYS
-        batches[-1].append(task)
-        room -= length
+            room, longest = most, lengths[n]
+        batches[-1].append(tasks[n])
+        room -= longest  # shorter ones are padded
     return batches
-
-
-def _length(clip: Clip) -> int:
-    """The number of keys of a clip's longest track."""
-    return max((len(track.times) for track in clip.tracks), default=0)
 
 
 def _work(batch: Sequence[tuple[int, Task]]) -> float:

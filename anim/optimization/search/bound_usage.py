@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix, quaternion
-from anim.measure.error.point_matrix import stack_points
 from anim.model import Skeleton
 from anim.optimization.options import Bounds
 from anim.optimization.search.source_motion import ROTATION
@@ -33,6 +33,22 @@ class BoundUsage:
         self._rows = clips.points.rows()
         self._allowed = allowed
         self._bounds = bounds
+        # nodes above points, level after level, so that each level is one slice of the arrays
+        order = np.concatenate(clips.levels) if clips.levels else np.empty(0, np.int64)
+        place = np.full(len(skeleton) + 1, -1)  # the last one for "no parent"
+        place[order] = np.arange(len(order))
+        ends = np.cumsum([0, *map(len, clips.levels)]).tolist()
+        self._levels = [np.arange(*each) for each in pairwise(ends)]
+        self._parents = place[skeleton.parents[order]]
+        self._point_places = place[clips.points.nodes]
+        self._moving = np.flatnonzero(place[clips.moving] >= 0)
+        self._moving_places = place[clips.moving[self._moving]]
+        varying, constant = (np.flatnonzero(place[nodes] >= 0) for nodes in (clips.varying, clips.constant))
+        self._varying_places, self._constant_places = place[clips.varying[varying]], place[clips.constant[constant]]
+        self._varying_matrices, self._constant_matrices = (
+            clips.varying_matrices[varying],
+            clips.constant_matrices[constant],
+        )
 
     def slerp_raw(self, shown: Sequence[Floats], clips: Ints) -> Floats:
         """Return the bound usage (P, b) of each point in `clips` (b,), for players with slerp."""
@@ -62,7 +78,7 @@ class BoundUsage:
         return own
 
     def _usage(self, shown: Sequence[Floats], columns: Floats, clips: Ints) -> Floats:
-        count = max(_block_times(len(self._skeleton)) // len(clips), MIN_BLOCK_TIMES)
+        count = max(_block_times(len(self._skeleton)) // len(clips), 2)
         length = self._clips.at.shape[1]
         if length <= count:
             return self._usage_over(slice(None), shown, columns, clips)
@@ -75,7 +91,7 @@ class BoundUsage:
         """The bound usage at some of the measurement times."""
         at = self._clips.at[clips, times]
         world = self._world([part[..., times] for part in shown], times, clips)
-        change = stack_points(world, self._clips.points.nodes)
+        change = world[self._point_places].reshape(-1, 3 * at.size)
         change -= take_clips(columns[..., times], clips, 2).reshape(change.shape)
         most, gaps = self._bounds.max_speed_error, np.maximum(np.diff(at), MIN_INTERVAL_S).astype(np.float32)
         usage = np.empty((len(self._clips.points), len(at)))
@@ -86,13 +102,16 @@ class BoundUsage:
         return usage
 
     def _world(self, shown: Sequence[Floats], times: slice, clips: Ints) -> Floats:
-        """World matrices (N, b · W, 3, 4); only nodes with tracks get new local matrices."""
-        moving = matrix.from_trs(*(np.moveaxis(part.reshape(*part.shape[:2], -1), 0, 2) for part in shown))
-        local = np.empty((len(self._skeleton), 4, 3, moving.shape[1]))
-        still = take_clips(self._clips.still_matrices[..., times], clips, 3)
-        local[self._clips.still] = still.reshape(*still.shape[:3], moving.shape[1])
-        local[self._clips.moving] = moving.transpose(0, 3, 2, 1)
-        return matrix.accumulate_world(local.transpose(0, 3, 2, 1), self._skeleton.parents, list(self._clips.levels))
+        """Columns (n, 4, 3, b · W) of the world matrices of nodes above points; only those with tracks are composed."""
+        parts = [part[:, self._moving] for part in shown]
+        moving = matrix.from_trs(*(np.moveaxis(part.reshape(*part.shape[:2], -1), 0, 2) for part in parts))
+        local = np.empty((len(self._parents), 4, 3, moving.shape[1]))
+        varying = take_clips(self._varying_matrices[..., times], clips, 3)
+        local[self._varying_places] = varying.reshape(*varying.shape[:3], moving.shape[1])
+        local[self._constant_places] = self._constant_matrices[..., None]
+        local[self._moving_places] = moving.transpose(0, 3, 2, 1)
+        world = matrix.accumulate_world(local.transpose(0, 3, 2, 1), self._parents, self._levels, in_place=True)
+        return world.transpose(0, 3, 2, 1)
 
 
 def _block_times(nodes: int) -> int:

@@ -5,14 +5,16 @@ Arrays are (C, T, ·): component, track, then key or time.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.optimization.search import playback
 from anim.optimization.search.key_intervals import KeyIntervals
 
 NUM_GAUSS_NEWTON_STEPS = 1  # for rotations
-MAX_STEPS = 512  # keys of an axis up to which all tracks are solved key by key; longer ones by a banded solver
+MAX_UNBANDED_KEYS = 512  # keys of an axis up to which all tracks are solved key by key; longer ones by a banded solver
 
 
 class KeyFit:
@@ -71,38 +73,46 @@ class KeyFit:
 
     def _solve(self, right: Floats, axis_of: Ints) -> Floats:
         """Keys (C, T, K) from the right sides of the normal equations: hat functions overlap only their neighbors'."""
-        if right.shape[2] > MAX_STEPS:
-            return self._solve_banded(right, axis_of)
-        pivots, factors = self._factorize()
-        factor = np.ascontiguousarray(factors[:, axis_of])
+        is_long = self._axes.counts[axis_of] > MAX_UNBANDED_KEYS
+        if is_long.any():
+            found = self._solve_banded(right, axis_of, is_long)
+            if not is_long.all():
+                found[:, ~is_long, :MAX_UNBANDED_KEYS] = self._solve(
+                    right[:, ~is_long, :MAX_UNBANDED_KEYS], axis_of[~is_long]
+                )
+            return found
+        pivots, factors = self._factors
         found = np.ascontiguousarray(np.moveaxis(right, 2, 0))  # (K, C, T)
+        factor = np.ascontiguousarray(factors[: len(found) - 1, axis_of])
         for k in range(1, len(found)):
             found[k] -= factor[k - 1] * found[k - 1]
-        found /= pivots[:, None, axis_of]
+        found /= pivots[: len(found), None, axis_of]
         for k in range(len(found) - 2, -1, -1):
             found[k] -= factor[k] * found[k + 1]
         return np.moveaxis(found, 0, 2)
 
-    def _factorize(self) -> tuple[Floats, Floats]:
-        """Pivots (K, A) and factors (K - 1, A) of the normal matrices, L·D·Lᵀ with one diagonal beside the main one."""
-        pivots, beside = self._diagonal.T.copy(), np.ascontiguousarray(self._beside.T)
+    @cached_property
+    def _factors(self) -> tuple[Floats, Floats]:
+        """Pivots (K, A) and factors (K - 1, A) of the normal matrices, L·D·Lᵀ with one diagonal beside the main one.
+
+        Of axes with more than MAX_UNBANDED_KEYS keys, only those of the first ones.
+        """
+        pivots = self._diagonal[:, :MAX_UNBANDED_KEYS].T.copy()
+        beside = np.ascontiguousarray(self._beside[:, : MAX_UNBANDED_KEYS - 1].T)
         factors = np.empty_like(beside)
         for k in range(1, len(pivots)):
             factors[k - 1] = beside[k - 1] / pivots[k - 1]
             pivots[k] -= factors[k - 1] * beside[k - 1]
         return pivots, factors
 
-    def _solve_banded(self, right: Floats, axis_of: Ints) -> Floats:
-        """The same for long axes: each is one banded system for all of its tracks."""
+    def _solve_banded(self, right: Floats, axis_of: Ints, is_long: Bools) -> Floats:
+        """The same for tracks (T,) on long axes: each is one banded system for all of its tracks."""
         from scipy.linalg import solveh_banded
 
         found = np.zeros_like(right)
-        for axis in np.unique(axis_of).tolist():
+        for axis in np.unique(axis_of[is_long]).tolist():
             mine, count = np.flatnonzero(axis_of == axis), int(self._axes.counts[axis])
             some = right[:, mine, :count]
-            if count == 1:
-                found[:, mine, :count] = some / self._diagonal[axis, 0]
-                continue
             bands = np.zeros((2, count))
             bands[0, 1:], bands[1] = self._beside[axis, : count - 1], self._diagonal[axis, :count]
             solved = solveh_banded(bands, some.reshape(-1, count).T)

@@ -72,9 +72,13 @@ class KeyedTracks:
         """
         clips = self._clips
         tracks = np.flatnonzero((axes.axis_of >= 0) & (clips.path == path))
-        count = max(MAX_STACKED_VALUES // clips.at.shape[1], 1)
-        for some in (tracks[first : first + count] for first in range(0, len(tracks), count)):
+        for some in (tracks[part] for part in self.parts(len(tracks))):
             yield self.store(some, clips.local[path][:, clips.row[some], clips.clip[some]], axes, tolerances)
+
+    def parts(self, count: int) -> Iterator[slice]:
+        """Yield parts of a number of tracks, as many at a time as memory allows."""
+        step = max(MAX_STACKED_VALUES // self._clips.at.shape[1], 1)
+        yield from (slice(first, first + step) for first in range(0, count, step))
 
     def store(self, tracks: Ints, values: Floats, axes: KeyedAxes, tolerances: Floats) -> StoredTracks:
         """Return tracks of one kind on axes, with other values (C, T, W) than their own.

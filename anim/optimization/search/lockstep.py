@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ from anim.optimization.search.trial import ClipTrials, Trial
 from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION, TrialBatch
 
 
-@dataclass(frozen=True, slots=True)
-class SearchRequest:
+class SearchRequest(NamedTuple):
     """A clip to search.
 
     free: indices of the tracks that may change. bound: m, error bound. spent: m, the part of it that other tracks use.
@@ -39,19 +38,18 @@ class SearchRequest:
     extra: frozenset[tuple[int, int]]
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """The best trial of a clip's search, with the motion that it approximates."""
+class SearchResult(NamedTuple):
+    """The best trial of a clip's search, with the motion that it approximates, as of `StackedClips.sources`."""
 
     source: SourceMotion
     result: TrialResult
 
 
-def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[Found | None]:
-    """Return what is found for each clip; None without a result within all bounds."""
+def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[SearchResult | None]:
+    """Return the result of each clip's search; None without one within all bounds."""
     clips = StackedClips(context.skeleton, [_analyze(context, each) for each in requests], context.points)
     trials = [
-        ClipTrials(source, context.coding, each.bound, each.droppable, each.shared)
+        ClipTrials(source, context.coding, each.bound, each.droppable, each.shared, num_clips=len(requests))
         for source, each in zip(clips.sources, requests, strict=True)
     ]
     allowed = np.tile([each.bound - each.spent for each in requests], (len(context.points), 1))
@@ -63,7 +61,8 @@ def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Ef
     ]
     best = run_searches(batch, searches)
     return [
-        None if result is None else Found(source, result) for source, result in zip(clips.sources, best, strict=True)
+        None if result is None else SearchResult(source, result)
+        for source, result in zip(clips.sources, best, strict=True)
     ]
 
 

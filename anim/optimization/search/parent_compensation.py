@@ -68,8 +68,8 @@ class ParentCompensation:
         world = np.empty_like(rotation)
         for level, above in self._descending(world):
             tracks = level.tracks[:, clips]
-            here, clip = np.nonzero(axis_of[tracks] >= 0)
-            if len(here):
+            on_axis = np.nonzero(axis_of[tracks] >= 0)
+            for here, clip in ([each[part] for each in on_axis] for part in self._keyed.parts(len(on_axis[0]))):
                 nodes = level.nodes[here]
                 targets = _targets(above[:, here, clip], true[:, nodes, clip], own[:, nodes, clip])
                 found = self._keyed.store(tracks[here, clip], targets, axes, tolerances)

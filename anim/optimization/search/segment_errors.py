@@ -12,7 +12,7 @@ from anim.curves.fitting.key_reduction import KEYS_PER_PART
 
 SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
-MAX_STACKED_VALUES = 1_000_000  # of tables, in one search: 4 MB
+MAX_STACKED_VALUES = 1_000_000  # of several tables in one search: 4 MB
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
 
@@ -90,6 +90,9 @@ def _stacked_size(waiting: Sequence[NDArray[np.float32]], errors: SegmentErrors,
 
 def _stacked_keys(tables: Sequence[NDArray[np.float32]]) -> list[Bools]:
     """The keys (k, K) of each table of costs (K, k, span): the first, and those on the paths of least cost."""
+    if len(tables) == 1:
+        costs = tables[0]
+        return [_fewest_keys(costs[1:], np.full(costs.shape[1], len(costs) - 1))]
     counts = [len(costs) for costs in tables]
     tracks = [costs.shape[1] for costs in tables]
     stacked = np.full((max(counts), sum(tracks), max(costs.shape[2] for costs in tables)), np.inf, np.float32)

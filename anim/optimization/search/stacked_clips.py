@@ -27,13 +27,15 @@ class StackedClips:
     (B, W) index of the grid's time at or before each. weights: (B, W) of the times in fits, 0 after a clip's last one.
     first_track: (B + 1,) of each clip's tracks. clip, node, path: (T,) of each track, the last two indices of nodes and
     in PATHS. moving: (M,) nodes with tracks. row: (T,) of each node among them. local: translation (3, M, B, W),
-    rotation (4, M, B, W), scale (3, M, B, W) of these nodes. still: (S,) the other nodes. still_matrices:
-    (S, 4, 3, B, W) columns of their local matrices. still_rotation: (4, S, B, W). points: of all clips, on nodes that
-    move in their parents' space, or are roots. levels: of the points' nodes. columns: (4 J, 3, B, W) of their world
-    matrices; by_chord: the same with nlerp.
+    rotation (4, M, B, W), scale (3, M, B, W) of these nodes. varying: (V,) nodes above points that other tracks move.
+    varying_matrices: (V, 4, 3, B, W) columns of their local matrices. varying_rotation: (4, V, B, W). constant,
+    constant_matrices, constant_rotation: the same of nodes that stay, without clips and times. points: of all clips, on
+    nodes that move in their parents' space, or are roots. levels: of the points' nodes. columns: (4 J, 3, B, W) of
+    their world matrices; by_chord: the same with nlerp. sources: without world matrices.
     """
 
     def __init__(self, skeleton: Skeleton, sources: Sequence[SourceMotion], points: PointMatrix) -> None:
+        self._num_nodes = len(skeleton)
         # without what is large for long clips
         self.sources = [replace(source, world=source.world[:0], chords=None) for source in sources]
         moving = [each for source in sources for each in source.moving]
@@ -54,12 +56,17 @@ class StackedClips:
         self.weights = (np.arange(self.at.shape[1]) < np.array(lengths)[:, None]).astype(np.float64)
         self.weights[:, 0] = self.weights[np.arange(len(sources)), np.array(lengths) - 1] = END_WEIGHT
         self.moving, self.row = np.unique(self.node, return_inverse=True)
-        self.still = np.setdiff1d(np.arange(len(skeleton)), self.moving)
         self.local = tuple(self._padded(sources, path, self.moving) for path in range(len(PATHS)))
-        still = [self._padded(sources, path, self.still) for path in range(len(PATHS))]
-        self.still_rotation = still[ROTATION]
-        self.still_matrices = _local_matrices(skeleton, still, self.still)
-        self.points, self.levels = _rebind(points, skeleton, self.still_matrices, self.still)
+        others = np.setdiff1d(np.concatenate(required_levels(skeleton, points.nodes) or [self.moving]), self.moving)
+        is_still = np.array([_is_constant(sources, node) for node in others.tolist()], np.bool_)
+        self.varying, self.constant = others[~is_still], others[is_still]
+        varying = [self._padded(sources, path, self.varying) for path in range(len(PATHS))]
+        self.varying_rotation = varying[ROTATION]
+        self.varying_matrices = _local_matrices(skeleton, varying, self.varying)
+        constant = [part[self.constant, :1].transpose(2, 0, 1)[..., None] for part in sources[0].local]
+        self.constant_rotation = constant[ROTATION]
+        self.constant_matrices = _local_matrices(skeleton, constant, self.constant)[..., 0, 0]
+        self.points, self.levels = _rebind(points, skeleton, self.constant, self.constant_matrices)
         self.columns = self._columns([source.world for source in sources])
         self.by_chord = self.columns
         if any(source.chords is not None for source in sources):
@@ -67,9 +74,10 @@ class StackedClips:
 
     @property
     def rotation(self) -> Floats:
-        """Rotations (4, N, B, W) of all nodes."""
-        found = np.empty((4, len(self.moving) + len(self.still), *self.at.shape))
-        found[:, self.moving], found[:, self.still] = self.local[ROTATION], self.still_rotation
+        """Rotations (4, N, B, W) of all nodes; 0 of those that are neither moving nor above a point."""
+        found = np.zeros((4, self._num_nodes, *self.at.shape))
+        found[:, self.constant] = self.constant_rotation
+        found[:, self.varying], found[:, self.moving] = self.varying_rotation, self.local[ROTATION]
         return found
 
     def _padded(self, sources: Sequence[SourceMotion], path: int, nodes: Ints) -> Floats:
@@ -108,29 +116,39 @@ def _local_matrices(skeleton: Skeleton, local: Sequence[Floats], nodes: Ints) ->
     shape = local[0].shape[1:]
     frames = shape[1] * shape[2]
     found = matrix.from_trs(*(np.moveaxis(part.reshape(len(part), shape[0], frames), 0, 2) for part in local))
-    found[np.isin(nodes, skeleton.sheared)] = skeleton.sheared_local[np.isin(skeleton.sheared, nodes)][:, None]
+    inside = np.isin(skeleton.sheared, nodes)
+    found[np.searchsorted(nodes, skeleton.sheared[inside])] = skeleton.sheared_local[inside, None]
     columns: Floats = found.transpose(0, 3, 2, 1)
     return columns.reshape(shape[0], 4, 3, *shape[1:])
 
 
 def _rebind(
-    points: PointMatrix, skeleton: Skeleton, matrices: Floats, still: Ints
+    points: PointMatrix, skeleton: Skeleton, constant: Ints, matrices: Floats
 ) -> tuple[PointMatrix, tuple[Ints, ...]]:
-    """The points on their nearest nodes that move in their parents' space, or are free to, or are roots.
+    """The points on their nearest nodes that move in their parents' space, or are roots: fewer world matrices.
 
-    Fewer world matrices are computed for them. still: (S,) nodes that are not free. matrices: (S, 4, 3, B, W), local
-    ones of these. Returned with the levels of the points' nodes.
+    constant: (S,) nodes that never move there. matrices: (S, 4, 3), columns of their local ones. Returned with the
+    levels of the points' nodes.
     """
-    start = matrices[..., :1, :1]
     moves = np.ones(len(skeleton), np.bool_)
-    moves[still] = (matrices != start).any(axis=(1, 2, 3, 4))
+    moves[constant] = False
     local = np.zeros((len(skeleton), 3, 4))
-    local[still] = np.swapaxes(start[..., 0, 0], 1, 2)
+    local[constant] = np.swapaxes(matrices, 1, 2)
     nearest, offsets = np.arange(len(skeleton)), np.tile(np.eye(4)[:3], (len(skeleton), 1, 1))
     for level in required_levels(skeleton, points.nodes)[1:]:
-        constant = level[~moves[level]]
-        above = skeleton.parents[constant]
-        nearest[constant] = nearest[above]
-        offsets[constant] = matrix.multiply(offsets[above], local[constant])
+        some = level[~moves[level]]
+        above = skeleton.parents[some]
+        nearest[some] = nearest[above]
+        offsets[some] = matrix.multiply(offsets[above], local[some])
     points = points.rebind(nearest, offsets)
     return points, required_levels(skeleton, points.nodes)
+
+
+def _is_constant(sources: Sequence[SourceMotion], node: int) -> bool:
+    """Return whether a node's local transform is the same at all times of all clips."""
+    first = sources[0].local
+    return all(
+        bool((part[node] == start[node, 0]).all())
+        for source in sources
+        for part, start in zip(source.local, first, strict=True)
+    )

@@ -103,7 +103,8 @@ def _merge_groups(clips: Sequence[_Groups], axis_bytes: float, time_bytes: float
         alive[some, b] = False
         count[some, a] = size = merged.sum(axis=1)
         cost[some, a] = price = axis_bytes + size * (time_bytes + width[some, a])
-        union = size[:, None] + count[some] - (sets[some] @ merged[:, :, None])[..., 0]
+        others = sets if len(some) == len(clips) else sets[some]
+        union = size[:, None] + count[some] - (others @ merged[:, :, None])[..., 0]
         row = price[:, None] + cost[some] - axis_bytes - union * (time_bytes + width[some, a][:, None] + width[some])
         row[~alive[some]] = -np.inf
         row[np.arange(len(some)), a] = -np.inf
@@ -116,7 +117,8 @@ def _merge_groups(clips: Sequence[_Groups], axis_bytes: float, time_bytes: float
 def _axes(groups: _Groups, alive: Bools, keys: Bools) -> list[SharedAxis]:
     length = groups.keys.shape[1]
     return [
-        SharedAxis(keys[n, :length], tuple(groups.members[n])) for n in np.flatnonzero(alive[: len(groups)]).tolist()
+        SharedAxis(keys[n, :length].copy(), tuple(groups.members[n]))
+        for n in np.flatnonzero(alive[: len(groups)]).tolist()
     ]
 
 

@@ -52,7 +52,7 @@ class ClipTrials:
     """Data that all trials of one clip share.
 
     bound: m. droppable: (G,) mask of the tracks that may be dropped. shared: per track, constants of other clips, the
-    most frequent first.
+    most frequent first. num_clips: that are searched together, and share memory.
     """
 
     def __init__(
@@ -62,13 +62,14 @@ class ClipTrials:
         bound: float,
         droppable: Bools,
         shared: Sequence[Sequence[Floats]],
+        *,
+        num_clips: int = 1,
     ) -> None:
-        self.source = source
         self.bound = bound
         self.meters = np.array([each.meters for each in source.moving])
         self.sizes = SizeEstimate(source, coding)
         self.layouts = TimeAxisSearch(source, coding, bound)
-        self.results = TrialCache()
+        self.results = TrialCache(num_clips)
         self._droppable = droppable
         self._from_rest = np.array([each.from_rest for each in source.moving])
         self._from_middle = np.array([each.from_middle for each in source.moving])

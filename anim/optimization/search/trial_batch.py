@@ -25,9 +25,9 @@ from anim.optimization.tracks.quantization import EncodedKeys, Encoding
 
 CHORD_BOUND_FRACTION = 0.02  # of the bound; if slerp and nlerp are closer, only slerp is measured
 
-NOTHING = np.empty((0, 0, 0))  # values that were written: they are large for long clips
+NO_VALUES = np.empty((0, 0, 0))  # values that were written: they are large for long clips
 
-Request: TypeAlias = tuple[int, Trial]  # index of the clip, and what to try in it
+TrialRequest: TypeAlias = tuple[int, Trial]  # index of the clip, and what to try in it
 
 
 class _Played(NamedTuple):
@@ -76,7 +76,7 @@ class TrialBatch:
             self._leeway[clip] = budget_gain(self._skeleton, self._clips.sources[clip], self._clips.points)
         return self._leeway[clip]
 
-    def run(self, requests: Sequence[Request]) -> list[TrialResult | None]:
+    def run(self, requests: Sequence[TrialRequest]) -> list[TrialResult | None]:
         """Return the result of each trial; None for one that takes `limit` or more bytes.
 
         requests: in the order of their clips.
@@ -96,7 +96,7 @@ class TrialBatch:
                 found.update(self._run_decided(group, target))
         return [found[clip] for clip, _ in requests]
 
-    def _find_axes(self, requests: Sequence[Request], actions: Sequence[Ints]) -> list[list[SharedAxis]]:
+    def _find_axes(self, requests: Sequence[TrialRequest], actions: Sequence[Ints]) -> list[list[SharedAxis]]:
         """The time axes of each trial; those of one layout are found together."""
         found: list[list[SharedAxis]] = [[] for _ in requests]
         for name in dict.fromkeys(trial.plan.axes for _, trial in requests):
@@ -117,7 +117,7 @@ class TrialBatch:
         played = self._prepare(group)
         axes = self._keyed.on([(clip, each.axes) for clip, each in group.items()])
         made = list(self._store(played, axes, target))
-        self._sort_keys(played, made)
+        self._add_keys(played, made)
         sizes = {
             clip: self._trials[clip].sizes.size(each.actions, mine, each.axes)
             for (clip, each), mine in zip(group.items(), played.keys, strict=True)
@@ -169,17 +169,17 @@ class TrialBatch:
         if target is RotationTarget.WORLD:
             paths.remove(ROTATION)
             for made in self._compensation.follow(axes, tolerances, played.shown[ROTATION], played.clips):
-                yield made._replace(shown=NOTHING)
+                yield made._replace(shown=NO_VALUES)
         for path in paths:
             for made in self._keyed.each(path, axes, tolerances):
                 self._write(played, path, made.tracks, made.shown)
-                yield made._replace(shown=NOTHING)
+                yield made._replace(shown=NO_VALUES)
 
     def _write(self, played: _Played, path: int, tracks: Ints, values: Floats) -> None:
         """Write the values (C, T, W) of tracks of one path to what is shown."""
         played.shown[path][:, self._clips.row[tracks], played.slot[self._clips.clip[tracks]]] = values
 
-    def _sort_keys(self, played: _Played, made: Sequence[StoredTracks]) -> None:
+    def _add_keys(self, played: _Played, made: Sequence[StoredTracks]) -> None:
         """Add the stored keys of all tracks to those of their clips."""
         for each in made:
             clips = self._clips.clip[each.tracks]

@@ -6,13 +6,14 @@ from collections.abc import Hashable
 
 from anim.optimization.search.plan import TrialResult
 
-MAX_CACHED_VALUES = 2_000_000  # 16 MB; a larger cache is cleared
+MAX_CACHED_VALUES = 2_000_000  # 16 MB, of all clips that are searched together; a larger cache is cleared
 
 
 class TrialCache:
-    """Results of the trials of one clip, as measured with slerp."""
+    """Results of the trials of one clip of several, as measured with slerp."""
 
-    def __init__(self) -> None:
+    def __init__(self, num_clips: int = 1) -> None:
+        self._max_values = MAX_CACHED_VALUES // num_clips
         self._results: dict[Hashable, TrialResult] = {}
         self._num_values = 0
 
@@ -25,7 +26,7 @@ class TrialCache:
         if name in self._results:
             return
         self._num_values += result.usage.size + sum(each.values.size for each in result.keys.values())
-        if self._num_values > MAX_CACHED_VALUES:
+        if self._num_values > self._max_values:
             self._results.clear()
             self._num_values = 0
         self._results[name] = result

@@ -22,7 +22,8 @@ def closure_sign(values: Floats, tolerance: float) -> float:
     ([0 0 0 1] … [0 0 0 −1], 0) → −1
     """
     signs = (1.0, -1.0) if values.shape[1] == 4 else (1.0,)
-    return next((sign for sign in signs if np.linalg.norm(values[-1] - sign * values[0]) <= tolerance), 0.0)
+    sign = min(signs, key=lambda sign: float(np.linalg.norm(values[-1] - sign * values[0])))
+    return sign if np.linalg.norm(values[-1] - sign * values[0]) <= tolerance else 0.0
 
 
 def close_ends(keys: Floats, signs: Floats, counts: Ints) -> None:

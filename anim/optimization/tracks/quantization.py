@@ -188,7 +188,8 @@ def encode_stack(
     decoded[:, some] = np.rint(keys[:, some] * MAX_INT16) / MAX_INT16
     by_track = np.ascontiguousarray(np.moveaxis(decoded, 0, 2))
     names = ["int16" if each else "float32" for each in integers]
-    stored = [EncodedKeys(by_track[t, : counts[t]], name) for t, name in enumerate(names)]
+    # copies: keys of few tracks are kept for long, and would keep those of all
+    stored = [EncodedKeys(by_track[t, : counts[t]].copy(), name) for t, name in enumerate(names)]
     return stored, decoded
 
 

@@ -13,7 +13,7 @@ from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
 from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.context import Context, build_context
-from anim.optimization.search.lockstep import Found, search_clips
+from anim.optimization.search.lockstep import SearchResult, search_clips
 from anim.optimization.search.plan import Solution
 from anim.optimization.search.source_motion import SourceMotion, analyze_source
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
@@ -85,7 +85,7 @@ def task_of(what: Clip, bound: float, *, unused: bool = False) -> Task:
 def solved(context: Context, task: Task) -> Solution | None:
     """The solution of a clip by itself: each of its searches is run alone."""
     steps = solve(context, task)
-    answer: Found | None = None
+    answer: SearchResult | None = None
     while True:
         try:
             request = steps.send(answer)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.optimization import optimize as optimize_
 from anim.optimization.clip import Task
-from anim.optimization.optimize import BATCH_KEYS
+from anim.optimization.optimize import BATCH_CLIPS, BATCH_KEYS, BATCH_MATRICES
 from anim.optimization.options import Bounds, Drop, Packing, Policy
 from tests.anim.optimization.making import task_of
 from tests.anim.optimization.optimizing import optimized, request_for
@@ -37,27 +35,34 @@ def _numbers(batches: list[list[tuple[int, Task]]]) -> list[int]:
 def test_batches_have_so_many_keys_at_most_the_longest_first() -> None:
     random = np.random.default_rng(3)
     tasks = list(enumerate(map(_task, [*random.integers(1, 200, 60).tolist(), BATCH_KEYS, 3 * BATCH_KEYS])))
-    batches = optimize_._batches(tasks)
+    batches = optimize_._batches(tasks, 1)
     lengths = _lengths(batches)
     assert sorted(_numbers(batches)) == list(range(62))
     every = [length for some in lengths for length in some]
     assert every == sorted(every, reverse=True)
     assert lengths[:2] == [[3 * BATCH_KEYS], [BATCH_KEYS]]
-    for some, after in pairwise(lengths[1:]):
-        assert sum(some) <= BATCH_KEYS < sum(some) + after[0]
+    for some in lengths[1:-1]:
+        assert some[0] * len(some) <= BATCH_KEYS
+        assert len(some) == BATCH_CLIPS or some[0] * (len(some) + 1) > BATCH_KEYS
+
+
+def test_scenes_of_many_nodes_have_smaller_batches() -> None:
+    tasks = list(enumerate(map(_task, [10] * 6)))
+    assert _lengths(optimize_._batches(tasks, BATCH_MATRICES // 20)) == [[10, 10]] * 3
+    assert _lengths(optimize_._batches(tasks, 10 * BATCH_MATRICES)) == [[10]] * 6
 
 
 def test_batches_follow_from_the_clips_and_not_from_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(optimize_, "BATCH_KEYS", 300)
     tasks = list(enumerate(map(_task, [30, 100, 30, 7, 250, 350, 7])))
     for some in (tasks, tasks[::-1]):
-        assert [_numbers([batch]) for batch in optimize_._batches(some)] == [[5], [4], [1, 0, 2, 3, 6]]
+        assert [_numbers([batch]) for batch in optimize_._batches(some, 1)] == [[5], [4], [1, 0, 2], [3, 6]]
 
 
 @pytest.mark.parametrize("lengths", [[], [0], [0, 0], [0, 5]])
 def test_clips_without_tracks(lengths: list[int]) -> None:
     tasks = [(n, _task(length)) for n, length in enumerate(lengths)]
-    found = optimize_._batches(tasks)
+    found = optimize_._batches(tasks, 1)
     assert sorted(_numbers(found)) == list(range(len(lengths)))
     assert all(found)
 

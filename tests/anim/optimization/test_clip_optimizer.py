@@ -14,7 +14,7 @@ from anim.optimization.clip import Solving, Task, solve
 from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
 from anim.optimization.options import Bounds, Effort, Packing, Request
 from anim.optimization.search.context import Context
-from anim.optimization.search.lockstep import Found, SearchRequest, search_clips
+from anim.optimization.search.lockstep import SearchRequest, SearchResult, search_clips
 from tests.anim.optimization.making import nodding, scene, stepping, task_of, waving
 from tests.clips import about, clip, track
 
@@ -140,7 +140,7 @@ def test_some_clips_are_tightened_side_by_side(monkeypatch: pytest.MonkeyPatch) 
     """Those whose first results fail are searched again together, and the others are finished."""
     searched: list[list[str]] = []
 
-    def watched(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[Found | None]:
+    def watched(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[SearchResult | None]:
         searched.append([each.clip.name for each in requests])
         return search_clips(context, requests, effort)
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 from anim.optimization.search import key_fit
-from anim.optimization.search.key_fit import MAX_STEPS, KeyFit
+from anim.optimization.search.key_fit import MAX_UNBANDED_KEYS, KeyFit
 from anim.optimization.search.key_intervals import KeyIntervals
 from anim.optimization.search.stacked_clips import END_WEIGHT
 from tests.calls import count_calls
@@ -67,10 +67,10 @@ def _lstsq(values: Floats, axis_of: Ints) -> list[Floats]:
     return found
 
 
-@pytest.mark.parametrize("steps", [0, MAX_STEPS])
+@pytest.mark.parametrize("steps", [0, MAX_UNBANDED_KEYS])
 def test_vectors_are_the_least_squares_of_numpy(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of tracks on several axes, key by key and, with more keys than steps, by bands."""
-    monkeypatch.setattr(key_fit, "MAX_STEPS", steps)
+    monkeypatch.setattr(key_fit, "MAX_UNBANDED_KEYS", steps)
     values = _walks()
     found = KeyFit(_intervals(PLACES), _weights()).vectors(values, AXIS_OF)
     assert found.shape == (2, len(AXIS_OF), 41)
@@ -137,9 +137,9 @@ def _turns() -> tuple[Floats, Floats]:
     return values, np.take_along_axis(values, np.broadcast_to(at, (4, *at.shape)), axis=2)
 
 
-@pytest.mark.parametrize("steps", [0, MAX_STEPS])
+@pytest.mark.parametrize("steps", [0, MAX_UNBANDED_KEYS])
 def test_rotations_together_have_the_keys_of_each_alone(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(key_fit, "MAX_STEPS", steps)
+    monkeypatch.setattr(key_fit, "MAX_UNBANDED_KEYS", steps)
     values, keys = _turns()
     together = KeyFit(_intervals(PLACES), _weights()).rotations(values, keys, AXIS_OF)
     for t, axis in enumerate(AXIS_OF.tolist()):
@@ -153,7 +153,7 @@ def test_long_axes_are_solved_by_bands_to_the_same_keys(monkeypatch: pytest.Monk
     walks, (turns, start) = _walks(), _turns()
     fit = KeyFit(_intervals(PLACES), _weights())
     by_key = fit.vectors(walks, AXIS_OF), fit.rotations(turns, start, AXIS_OF)
-    monkeypatch.setattr(key_fit, "MAX_STEPS", 0)
+    monkeypatch.setattr(key_fit, "MAX_UNBANDED_KEYS", 0)
     banded = count_calls(monkeypatch, KeyFit, "_solve_banded")
     by_bands = fit.vectors(walks, AXIS_OF), fit.rotations(turns, start, AXIS_OF)
     is_key = _intervals(PLACES).is_key[AXIS_OF]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from anim.model import Clip
 from anim.optimization.options import EFFORTS, Bounds, Packing
 from anim.optimization.search.context import Context
-from anim.optimization.search.lockstep import Found, SearchRequest, search_clips
+from anim.optimization.search.lockstep import SearchRequest, SearchResult, search_clips
 from anim.optimization.search.plan import RotationTarget
 from anim.optimization.search.trial import Trial
 from anim.optimization.search.trial_batch import TrialBatch
@@ -39,7 +38,7 @@ def _requests() -> list[SearchRequest]:
     return [_request(what, number) for number, what in enumerate(CLIPS)]
 
 
-def _same(some: Found | None, other: Found | None) -> None:
+def _same(some: SearchResult | None, other: SearchResult | None) -> None:
     assert some is not None
     assert other is not None
     a, b = some.result, other.result
@@ -123,7 +122,7 @@ def test_bounds_on_angles_and_speeds_take_bytes() -> None:
 def test_a_clip_without_a_result_leaves_the_others_alone() -> None:
     context = CONTEXTS["plain"]
     requests = _requests()[:3]
-    requests[1] = replace(requests[1], bound=1e-13, spent=0.0)
+    requests[1] = requests[1]._replace(bound=1e-13, spent=0.0)
     found = search_clips(context, requests, EFFORTS["fast"])
     assert found[1] is None
     for n in (0, 2):
@@ -132,7 +131,7 @@ def test_a_clip_without_a_result_leaves_the_others_alone() -> None:
 
 def _unequal_requests() -> list[SearchRequest]:
     """Of the second nothing is found, after many trials: float32 itself is too coarse."""
-    return [replace(_request(what), bound=bound) for what, bound in ((CLIPS[0], BOUND), (CLIPS[1], 1e-13))]
+    return [_request(what)._replace(bound=bound) for what, bound in ((CLIPS[0], BOUND), (CLIPS[1], 1e-13))]
 
 
 def test_all_clips_are_tried_in_one_step(monkeypatch: pytest.MonkeyPatch) -> None:
