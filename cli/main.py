@@ -114,7 +114,8 @@ def main() -> None:
     folder = os.environ.get(MATPLOTLIB_FOLDER)
     for name in UNUSED_VARIABLES:
         os.environ.pop(name, None)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrix products are small: more threads only cost time
+    # The matrix products are small: more threads only cost time, and on some processors they change the last digits.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of packages: they are for programmers, and stderr is for messages
     with suppress(ImportError):  # raised again, and reported, when the command runs
