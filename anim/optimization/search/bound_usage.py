@@ -104,10 +104,11 @@ class BoundUsage:
     def _world(self, shown: Sequence[Floats], times: slice, clips: Ints) -> Floats:
         """Columns (n, 4, 3, b · W) of the world matrices of nodes above points; only those with tracks are composed."""
         parts = [part[:, self._moving] for part in shown]
-        moving = matrix.from_trs(*(np.moveaxis(part.reshape(*part.shape[:2], -1), 0, 2) for part in parts))
-        local = np.empty((len(self._parents), 4, 3, moving.shape[1]))
+        frames = parts[0].shape[2] * parts[0].shape[3]
+        moving = matrix.from_trs(*(np.moveaxis(part.reshape(*part.shape[:2], frames), 0, 2) for part in parts))
+        local = np.empty((len(self._parents), 4, 3, frames))
         varying = take_clips(self._varying_matrices[..., times], clips, 3)
-        local[self._varying_places] = varying.reshape(*varying.shape[:3], moving.shape[1])
+        local[self._varying_places] = varying.reshape(*varying.shape[:3], frames)
         local[self._constant_places] = self._constant_matrices[..., None]
         local[self._moving_places] = moving.transpose(0, 3, 2, 1)
         world = matrix.accumulate_world(local.transpose(0, 3, 2, 1), self._parents, self._levels, in_place=True)
