@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, freeze
 from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track, parse_weight_pointer
 from anim.model.track import share_time_axes
-from anim.optimization.options import Drop
+from anim.optimization.options import Drop, Policy
 from anim.optimization.search.context import Context
 from anim.optimization.search.lockstep import SearchRequest, SearchResult
 from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
@@ -42,6 +42,12 @@ class Task:
     bound: float
     at_rest: tuple[bool, ...] = ()
     extra: frozenset[tuple[int, int]] = frozenset()
+
+    def is_droppable(self, i: int, policy: Policy) -> bool:
+        """Return whether the channel of track `i` may be dropped if the track stays at the rest value."""
+        if self.clip.tracks[i].node in policy.keep:
+            return False
+        return policy.drop is Drop.REST or (policy.drop is Drop.UNUSED and self.unused[i])
 
 
 Solving: TypeAlias = Generator[SearchRequest, SearchResult | None, Solution | None]
@@ -162,10 +168,7 @@ class _TrackSorter:
         self._done[i] = _with_own_keys(track)
 
     def _is_droppable(self, i: int) -> bool:
-        policy = self._context.policy
-        if self._clip.tracks[i].node in policy.keep:
-            return False
-        return policy.drop is Drop.REST or (policy.drop is Drop.UNUSED and self._task.unused[i])
+        return self._task.is_droppable(i, self._context.policy)
 
     def _reduce_weights(self) -> None:
         """Reduce morph weights within their own fraction of the bound; the search gets the rest."""
@@ -246,7 +249,10 @@ def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, 
 
 def _new_track(track: Track, at: TimeAxis, stored: EncodedKeys) -> Track:
     storage = key_reduction.INT16 if stored.form in ("int16", "quaternion") else FLOAT32
-    return replace(track.with_keys(at, stored.exact(), interpolation=Interpolation.LINEAR), storage=storage)
+    values = freeze(stored.exact())
+    return Track.unchecked(
+        track.node, track.path, Interpolation.LINEAR, at, values, pointer=track.pointer, storage=storage
+    )
 
 
 def _with_ends(clip: Clip, every: dict[int, tuple[Track, EncodedKeys]], dropped: list[int]) -> Solution:

@@ -170,7 +170,7 @@ def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[C
     is_exact = context.bounds.max_error == 0
     if best is not None and (is_exact or _keys(best.solution.clip) < MAX_REDUCED_KEY_FRACTION * _keys(task.clip)):
         return best
-    if best is not None and best.solution.size(context.coding) <= _min_lossless_bytes(context, task.clip):
+    if best is not None and best.solution.size(context.coding) <= _min_lossless_bytes(context, task):
         return best
     lossless = replace(context, bounds=replace(context.bounds, max_error=0.0))
     exact = yield from _solve(lossless, task, context.effort)
@@ -195,11 +195,12 @@ def _solve(context: Context, task: Task, effort: Effort) -> Optimizing[Solution 
         answer = yield effort, request
 
 
-def _min_lossless_bytes(context: Context, clip: Clip) -> float:
+def _min_lossless_bytes(context: Context, task: Task) -> float:
     """Bytes that the lossless version takes at least."""
     if context.policy.drop_invisible:  # its channels of nodes without vertices are dropped
         return 0.0
-    return min_lossless_bytes(clip.tracks, context.coding.byte_costs)
+    stays = [not task.is_droppable(i, context.policy) for i in range(len(task.clip.tracks))]
+    return min_lossless_bytes(task.clip.tracks, stays, context.coding.byte_costs)
 
 
 def _verify(optimizer: ClipOptimizer, number: int, solution: Solution) -> ClipResult:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Bools
+from anim.arrays import Bools, Floats
 from anim.curves.fitting.key_reduction import greedy_keys
 from anim.model import FLOAT32, AccessorFormat, Interpolation, Track, ValueKind
 from anim.sampling.track import sample
@@ -74,8 +74,19 @@ def _is_constant_spline(track: Track) -> bool:
 def _fits_int16(track: Track) -> bool:
     if track.path != "rotation" or track.storage != FLOAT32 or track.interpolation is Interpolation.CUBICSPLINE:
         return False
-    scaled = np.rint(track.values * 32767)
-    return len(track.values) > 1 and bool((np.abs(scaled) <= 32767).all() and (scaled / 32767 == track.values).all())
+    return len(track.values) > 1 and bool(are_exact_in_int16(track.values[None])[0])
+
+
+def are_exact_in_int16(values: Floats) -> Bools:
+    """Return which of the tracks' values (G, K, C) normalized int16 represents exactly (G,)."""
+    fits = _are_exact(values[:, :1])  # hardly any track passes its first key
+    fits[fits] = _are_exact(values[fits])
+    return fits
+
+
+def _are_exact(values: Floats) -> Bools:
+    scaled = np.rint(values * 32767)
+    return np.asarray(((np.abs(scaled) <= 32767) & (scaled / 32767 == values)).all(axis=(1, 2)))
 
 
 def reduce_pointer_keys(track: Track, bound: float) -> Track:

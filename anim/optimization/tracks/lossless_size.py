@@ -6,47 +6,53 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats
 from anim.gltf.validation.buffer_layout import COMPONENT_SIZES
-from anim.model import Interpolation, TimeAxis, Track
+from anim.model import FLOAT32, Interpolation, TimeAxis, Track
+from anim.optimization.tracks.key_reduction import INT16, are_exact_in_int16
 from anim.optimization.tracks.quantization import ByteCosts
 
-INT16_SIZE = 2  # bytes of a component; rotations may be stored so without loss
 
+def min_lossless_bytes(tracks: Sequence[Track], stays: Sequence[bool], costs: ByteCosts) -> float:
+    """Return bytes that `key_reduction.reduce_lossless` of all tracks takes at least.
 
-def min_lossless_bytes(tracks: Sequence[Track], costs: ByteCosts) -> float:
-    """Return bytes that `key_reduction.reduce_lossless` of all tracks takes at least, times and constants apart.
-
-    Tracks on one time axis are counted together, and tracks of equal values once. Pointers count nothing: they have a
-    bound of their own.
+    stays: whether each track is written even if it is constant; other constants count nothing. Tracks on one time axis
+    are reduced together; equal values, and equal key times, count once. Pointers count nothing: they have a bound of
+    their own.
     """
-    seen: set[bytes] = set()
-    groups: dict[tuple[TimeAxis, Interpolation, int, int], list[Floats]] = {}
-    for track in tracks:
-        if track.node is None or (data := track.values.tobytes()) in seen:
-            continue
-        seen.add(data)
-        size = COMPONENT_SIZES[track.storage.component_type]
-        component = min(size, INT16_SIZE) if track.path == "rotation" else size
-        key = track.time_axis, track.interpolation, track.values.shape[1], component
-        groups.setdefault(key, []).append(track.values)
-    total = 0.0
-    for (_, interpolation, width, component), values in groups.items():
-        kept = _retained_keys(np.array(values), interpolation)
-        parts = 3 if interpolation is Interpolation.CUBICSPLINE else 1
-        total += costs.track * np.count_nonzero(kept) + parts * component * width * int(kept.sum())
-    return total
+    groups: dict[tuple[TimeAxis, Interpolation, int], list[tuple[Track, bool]]] = {}
+    for track, stay in zip(tracks, stays, strict=True):
+        if track.node is not None:
+            key = track.time_axis, track.interpolation, track.values.shape[1]
+            groups.setdefault(key, []).append((track, stay))
+    sizes: dict[tuple[int, bytes], int] = {}
+    axes: set[bytes] = set()
+    text = 0.0
+    for (axis, interpolation, _), group in groups.items():
+        values = np.array([track.values for track, _ in group])
+        is_constant, kept = _retained_keys(values, interpolation)
+        fits = are_exact_in_int16(values) & (interpolation is not Interpolation.CUBICSPLINE)
+        for (track, stay), constant, mask, fit in zip(group, is_constant.tolist(), kept, fits.tolist(), strict=True):
+            if constant:
+                text += costs.single_key * stay
+                continue
+            slim, parts = track.values[mask], 3 if interpolation is Interpolation.CUBICSPLINE else 1
+            storage = INT16 if fit and track.path == "rotation" and track.storage == FLOAT32 else track.storage
+            component = COMPONENT_SIZES[storage.component_type]
+            text += costs.track
+            sizes[component, slim.tobytes()] = parts * component * slim.size
+            axes.add(axis.times[mask].tobytes())
+    return text + sum(sizes.values()) + sum(costs.axis + 4 * len(each) // 8 for each in axes)
 
 
-def _retained_keys(values: Floats, interpolation: Interpolation) -> Ints:
-    """For each of G tracks (G, K, C) its count of keys after the reduction; 0 for constant ones."""
+def _retained_keys(values: Floats, interpolation: Interpolation) -> tuple[Bools, Bools]:
+    """Masks of the constant ones of G tracks (G, K, C), and (G, K) of the keys after the reduction of the others."""
     same = (values[:, 1:] == values[:, :-1]).all(axis=2)  # equal to the previous key
-    count = values.shape[1]
+    first = np.ones((len(values), 1), np.bool_)
     if interpolation is Interpolation.STEP:
-        kept = count - same.sum(axis=1)
+        kept = np.hstack((first, ~same))
     elif interpolation is Interpolation.CUBICSPLINE:
-        kept = np.full(len(values), count)
+        kept = np.ones(values.shape[:2], np.bool_)
     else:
-        ends = np.ones((len(values), 1), np.bool_)
-        kept = count - (np.hstack((ends, same)) & np.hstack((same, ends))).sum(axis=1)
-    return np.asarray(np.where(same.all(axis=1), 0, kept))
+        kept = ~(np.hstack((first, same)) & np.hstack((same, first)))
+    return same.all(axis=1), kept
