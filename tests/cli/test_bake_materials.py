@@ -103,6 +103,7 @@ def test_other_meshes_stay_unless_meshes_are_selected(call: Call, textured_path:
     assert meshes("--rigid") == ["strip", "flag", "dust"]
 
 
+@needs_validator
 def test_the_data_of_meshes_that_are_left_out_is_gone(call: Call, asset: Find, tmp_path: Path) -> None:
     out = tmp_path / "body.glb"
     assert call("bake", asset("Knight.glb"), out, "--clip", "Cheer", "--mesh", "Knight_Body", "--fps", "4").code == 0
@@ -217,6 +218,7 @@ def test_quantized_targets_in_mesh_space(call: Call, textured_path: Path) -> Non
     assert "KHR_mesh_quantization" in document.json["extensionsRequired"]
 
 
+@needs_validator
 @pytest.mark.parametrize(("name", "clip"), ASSETS)
 def test_real_files_keep_materials_images_and_texture_coordinates(
     call: Call, asset: Find, tmp_path: Path, name: str, clip: str

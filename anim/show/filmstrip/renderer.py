@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from anim.show.filmstrip.surface import Surface
 
 SAMPLES = 3  # across and down in each pixel
-MAX_BAND_PIXELS = 1 << 18  # of the background, drawn at a time: 500 bytes each
-MAX_BAND_SAMPLES = 1 << 22  # samples drawn at a time, approximately: 60 bytes each
+MAX_BAND_PIXELS = 1 << 16  # of the background, drawn at a time: 500 bytes each
+MAX_BAND_SAMPLES = 1 << 20  # samples drawn at a time, approximately: 60 bytes each
 # Linear light.
 SKY, EARTH = np.array([0.86, 0.875, 0.89]), np.array([0.70, 0.70, 0.70])  # background, from top to bottom
 LINE, SHADOW = np.array([0.52, 0.53, 0.55]), np.array([0.16, 0.17, 0.20])
