@@ -127,7 +127,9 @@ class ClipOptimizer:
 
 
 def optimize_clips(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) -> list[ClipResult]:
-    """Return each clip `item[0]` in the fewest bytes found within all bounds, verified as stored.
+    """Return clips in the fewest bytes found within all bounds, verified as stored.
+
+    items: of each clip, its number in the file and its task.
 
     All are searched and verified side by side. The lossless version competes too: a few splines or steps can be smaller
     than the lines that replace them.

@@ -10,10 +10,10 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.optimization.options import Packing
 from anim.optimization.search import playback
+from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.key_fit import KeyFit
 from anim.optimization.search.key_intervals import KeyIntervals, find_intervals
 from anim.optimization.search.stacked_clips import StackedClips
-from anim.optimization.search.time_axes import SharedAxis
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.clip_ends import close_ends
 from anim.optimization.tracks.quantization import EncodedKeys

@@ -52,10 +52,6 @@ class _Search:
         self._find_leeway = leeway
         self._best: TrialResult | None = None
 
-    @property
-    def _leeway(self) -> Floats:
-        return self._find_leeway()
-
     def run(self) -> Search:
         yield from self._find_first()
         for _ in range(self._effort.cycles if self._best else 0):
@@ -116,7 +112,7 @@ class _Search:
             plan = replace(
                 before.plan,
                 rotation_target=RotationTarget.WORLD,
-                budgets=before.plan.budgets * self._leeway**fraction,
+                budgets=before.plan.budgets * self._find_leeway() ** fraction,
             )
             yield from self._adapt(plan, self._effort.rounds)
             if self._best is before:
@@ -153,7 +149,7 @@ class _Search:
         usage = source.answering.largest(outcome.usage, [each.node for each in source.moving])
         usage = np.maximum(usage, outcome.own)
         factor = np.clip((TARGET_USAGE / np.maximum(usage, 1e-9)) ** FEEDBACK_EXPONENT, *BUDGET_FACTOR_RANGE)
-        gain = self._leeway if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
+        gain = self._find_leeway() if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
         return np.asarray(np.minimum(budgets * factor, MAX_BUDGET_PER_BOUND * self._bound * gain))
 
     def _shrink(self, plan: Plan) -> Step:
@@ -188,7 +184,7 @@ class _Search:
         assert self._best is not None
         source = self._source
         used = float(self._best.usage[source.answering.of(source.moving[track].node)].max(initial=0.0))
-        gain = self._leeway[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
+        gain = self._find_leeway()[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
         miss = self._best.keys[track].error
         return miss > 0 and used + miss * source.moving[track].meters / gain / 2 / self._bound < MAX_FORESEEN_USAGE
 

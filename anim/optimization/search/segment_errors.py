@@ -12,7 +12,7 @@ from anim.curves.fitting.key_reduction import KEYS_PER_PART
 
 SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
-MAX_STACKED_VALUES = 1_000_000  # of several tables in one search: 4 MB
+MAX_JOINT_TABLE_VALUES = 1_000_000  # of several tables in one search: 4 MB
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
 
@@ -72,7 +72,7 @@ def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Boo
     waiting: list[NDArray[np.float32]] = []
     for errors, tracks, budgets in asked:
         is_long = len(errors) > KEYS_PER_PART
-        if waiting and (is_long or _stacked_size(waiting, errors, len(tracks)) > MAX_STACKED_VALUES):
+        if waiting and (is_long or _stacked_size(waiting, errors, len(tracks)) > MAX_JOINT_TABLE_VALUES):
             found += _stacked_keys(waiting)
             waiting = []
         if is_long:
@@ -106,7 +106,7 @@ def _stacked_keys(tables: Sequence[NDArray[np.float32]]) -> list[Bools]:
 def _keys_of_parts(errors: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:
     """The keys (k, K) of long tracks, searched in parts of KEYS_PER_PART keys, between which a key stays."""
     keep = np.ones((len(tracks), len(errors)), np.bool_)
-    parts = max(MAX_STACKED_VALUES // (len(tracks) * errors.span * KEYS_PER_PART), 1)
+    parts = max(MAX_JOINT_TABLE_VALUES // (len(tracks) * errors.span * KEYS_PER_PART), 1)
     for start in range(1, len(errors), parts * KEYS_PER_PART):
         some = slice(start, start + parts * KEYS_PER_PART)
         keep[:, some] = _keys_after_first(errors.costs(tracks, budgets, some))

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from anim.arrays import Ints
+from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.plan import TrackAction
 from anim.optimization.search.source_motion import PATHS, SourceMotion
-from anim.optimization.search.time_axes import SharedAxis
 from anim.optimization.tracks.quantization import MAX_INT16, EncodedKeys, Encoding
 
 INT16_STEP = 1 / MAX_INT16

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -11,115 +10,13 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import greedy_keys, joint_greedy_keys
 from anim.optimization.search import segment_errors
+from anim.optimization.search.axis_merging import SharedAxis, merge_axes
 from anim.optimization.search.segment_errors import SegmentErrors, fits
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.tracks.quantization import Encoding
 
 CONSTANT_TOLERANCE = 0.1  # of the bound: tracks this close to their middle value get no table
-MAX_BUDGET_PER_BOUND = 4.0  # larger budgets are rare
-MAX_STACKED_PAIRS = 1_000_000  # of groups of tracks whose axes are merged at once
-
-
-@dataclass(frozen=True, slots=True)
-class SharedAxis:
-    """Mask (K,) of the grid's times that are the keys of all tracks `members`."""
-
-    keys: Bools
-    members: tuple[int, ...]
-
-    @property
-    def num_keys(self) -> int:
-        """Number of the keys."""
-        return int(np.count_nonzero(self.keys))
-
-
-def merge_axes(
-    asked: Sequence[tuple[Bools, Floats]], *, axis_bytes: float, time_bytes: float
-) -> list[list[SharedAxis]]:
-    """Return for each clip the axes of fewest bytes found for its tracks, which require the keys `keep` (G, K).
-
-    asked: `keep`, and the bytes (G,) of one key of each track. An axis costs `axis_bytes` and `time_bytes` per key. The
-    pair whose union saves most is merged until none saves anything.
-    """
-    merges = [_Groups(keep, key_bytes) for keep, key_bytes in asked]
-    found: list[list[SharedAxis]] = []
-    for some in _stackable(merges):
-        found += _merge_groups(some, axis_bytes, time_bytes)
-    return found
-
-
-class _Groups:
-    """The tracks of a clip in groups of equal keys. keys: (G', K). width: (G',) bytes of one key of a group."""
-
-    def __init__(self, keep: Bools, key_bytes: Floats) -> None:
-        groups: dict[bytes, list[int]] = {}
-        for i, row in enumerate(keep):
-            groups.setdefault(row.tobytes(), []).append(i)
-        self.members = list(groups.values())
-        self.keys = keep[[each[0] for each in self.members]]
-        self.width = np.array([key_bytes[each].sum() for each in self.members])
-
-    def __len__(self) -> int:
-        return len(self.members)
-
-
-def _stackable(merges: Sequence[_Groups]) -> Iterator[list[_Groups]]:
-    """Parts of the list whose pairs of groups together fit in memory."""
-    some: list[_Groups] = []
-    for each in merges:
-        if some and (len(some) + 1) * max(len(each), *map(len, some)) ** 2 > MAX_STACKED_PAIRS:
-            yield some
-            some = []
-        some.append(each)
-    if some:
-        yield some
-
-
-def _merge_groups(clips: Sequence[_Groups], axis_bytes: float, time_bytes: float) -> list[list[SharedAxis]]:
-    """The axes of each clip; in each step one pair of groups is merged in every clip that is not finished."""
-    most, length = max(map(len, clips)), max(each.keys.shape[1] for each in clips)
-    sets, width = np.zeros((len(clips), most, length)), np.zeros((len(clips), most))
-    alive = np.zeros((len(clips), most), np.bool_)
-    for n, each in enumerate(clips):
-        sets[n, : len(each), : each.keys.shape[1]], width[n, : len(each)] = each.keys, each.width
-        alive[n, : len(each)] = True
-    count = sets.sum(axis=2)
-    cost = axis_bytes + count * (time_bytes + width)
-    union = count[:, :, None] + count[:, None] - sets @ sets.transpose(0, 2, 1)
-    gain = cost[:, :, None] + cost[:, None] - axis_bytes - union * (time_bytes + width[:, :, None] + width[:, None])
-    gain[:, range(most), range(most)] = -np.inf
-    gain[~(alive[:, :, None] & alive[:, None])] = -np.inf
-    while True:
-        pair = gain.reshape(len(clips), -1).argmax(axis=1)
-        some = np.flatnonzero(gain.reshape(len(clips), -1)[np.arange(len(clips)), pair] > 0)
-        if not len(some):
-            return [_axes(each, alive[n], sets[n] > 0) for n, each in enumerate(clips)]
-        a, b = np.divmod(pair[some], most)
-        for n, i, j in zip(some.tolist(), a.tolist(), b.tolist(), strict=True):
-            clips[n].members[i] = clips[n].members[i] + clips[n].members[j]
-        merged = np.maximum(sets[some, a], sets[some, b])
-        sets[some, a] = merged
-        width[some, a] += width[some, b]
-        alive[some, b] = False
-        count[some, a] = size = merged.sum(axis=1)
-        cost[some, a] = price = axis_bytes + size * (time_bytes + width[some, a])
-        others = sets if len(some) == len(clips) else sets[some]
-        union = size[:, None] + count[some] - (others @ merged[:, :, None])[..., 0]
-        row = price[:, None] + cost[some] - axis_bytes - union * (time_bytes + width[some, a][:, None] + width[some])
-        row[~alive[some]] = -np.inf
-        row[np.arange(len(some)), a] = -np.inf
-        gain[some, a] = row
-        gain[some, :, a] = row
-        gain[some, b] = -np.inf
-        gain[some, :, b] = -np.inf
-
-
-def _axes(groups: _Groups, alive: Bools, keys: Bools) -> list[SharedAxis]:
-    length = groups.keys.shape[1]
-    return [
-        SharedAxis(keys[n, :length].copy(), tuple(groups.members[n]))
-        for n in np.flatnonzero(alive[: len(groups)]).tolist()
-    ]
+MAX_TABLED_BUDGET = 4.0  # of the bound; larger budgets are rare
 
 
 class TimeAxisSearch:
@@ -140,7 +37,7 @@ class TimeAxisSearch:
             self._tabled = np.empty(0, np.int64)
         self._is_tabled = np.zeros(len(moved), np.bool_)
         self._is_tabled[self._tabled] = True
-        self._segments = SegmentErrors(self._scaled[self._tabled], source.grid, MAX_BUDGET_PER_BOUND * bound)
+        self._segments = SegmentErrors(self._scaled[self._tabled], source.grid, MAX_TABLED_BUDGET * bound)
         self._rows: dict[tuple[int, float], Bools] = {}
 
     def scaled(self, keyed: Ints, budgets: Floats) -> Floats:

@@ -12,13 +12,14 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.model import Skeleton
 from anim.optimization.search import playback
+from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.keyed_tracks import KeyedAxes, KeyedTracks, StoredTracks
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
 from anim.optimization.search.plan import RotationTarget, TrackAction, TrialResult
 from anim.optimization.search.source_motion import PATHS, ROTATION
 from anim.optimization.search.stacked_clips import StackedClips
-from anim.optimization.search.time_axes import SharedAxis, find_axes
+from anim.optimization.search.time_axes import find_axes
 from anim.optimization.search.trial import ClipTrials, Decisions, Trial
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding

@@ -9,7 +9,8 @@ from anim.arrays import Bools, Floats, Ints
 from anim.model import Clip
 from anim.optimization.options import EFFORTS
 from anim.optimization.search import segment_errors, time_axes
-from anim.optimization.search.time_axes import LAYOUTS, SharedAxis, TimeAxisSearch, find_axes, find_keys
+from anim.optimization.search.axis_merging import SharedAxis
+from anim.optimization.search.time_axes import LAYOUTS, TimeAxisSearch, find_axes, find_keys
 from tests.anim.optimization.making import (
     CORE,
     TIMES,

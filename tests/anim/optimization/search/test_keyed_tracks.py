@@ -11,10 +11,10 @@ from anim.arrays import Bools, Floats, Ints
 from anim.maths import quaternion
 from anim.optimization.options import Packing
 from anim.optimization.search import keyed_tracks, playback
+from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.keyed_tracks import KeyedAxes, KeyedTracks, StoredTracks
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceTrack
 from anim.optimization.search.stacked_clips import StackedClips
-from anim.optimization.search.time_axes import SharedAxis
 from anim.sampling.track import sample
 from tests.anim.optimization.making import TIMES, turning, waving
 from tests.anim.optimization.search.stacks import CLIPS, stack

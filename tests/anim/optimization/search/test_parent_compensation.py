@@ -11,11 +11,11 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Scene
 from anim.optimization.options import Packing
+from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.keyed_tracks import KeyedTracks
 from anim.optimization.search.parent_compensation import ParentCompensation, budget_gain
 from anim.optimization.search.source_motion import ROTATION, SourceMotion
 from anim.optimization.search.stacked_clips import StackedClips
-from anim.optimization.search.time_axes import SharedAxis
 from tests.anim.optimization.making import TIMES, truth_of, turning
 from tests.clips import clip, skeleton, track
 

@@ -98,7 +98,7 @@ def test_parts_of_long_tracks_are_searched_by_themselves(monkeypatch: pytest.Mon
     values, times = _random(4, count, tracks=2)
     budgets = np.array([1.0, 3])
     keep = _keys(SegmentErrors(values, times, 4.0), np.arange(2), budgets)
-    monkeypatch.setattr(segment_errors, "MAX_STACKED_VALUES", 1)
+    monkeypatch.setattr(segment_errors, "MAX_JOINT_TABLE_VALUES", 1)
     assert (_keys(SegmentErrors(values, times, 4.0), np.arange(2), budgets) == keep).all()
     for start in range(0, count - 1, 200):
         part = slice(start, start + 201)

@@ -50,13 +50,15 @@ def test_keys_are_those_of_a_plain_loop() -> None:
         np.testing.assert_array_equal(keys, _plain(*asked))
 
 
-@pytest.mark.parametrize(("values", "calls"), [(1, len(SHAPES)), (20000, 3), (segment_errors.MAX_STACKED_VALUES, 1)])
+@pytest.mark.parametrize(
+    ("values", "calls"), [(1, len(SHAPES)), (20000, 3), (segment_errors.MAX_JOINT_TABLE_VALUES, 1)]
+)
 def test_tables_together_have_the_keys_of_each_alone(values: int, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also in parts, where all together would take too much memory."""
     asked = _asked()
     alone = [greedy_keys([each])[0] for each in asked]
     assert len({keys.sum() for keys in alone}) > 3
-    monkeypatch.setattr(segment_errors, "MAX_STACKED_VALUES", values)
+    monkeypatch.setattr(segment_errors, "MAX_JOINT_TABLE_VALUES", values)
     counted = count_calls(monkeypatch, segment_errors, "_stacked_keys")
     together = greedy_keys(asked)
     assert len(counted) == calls

@@ -89,7 +89,7 @@ def test_held_as_other_clips_hold_it() -> None:
 
 def test_chords_are_asked_where_they_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     """150° in a step or two would do along arcs; players that mix components cut the corner."""
-    monkeypatch.setattr(time_axes, "MAX_BUDGET_PER_BOUND", math.inf)
+    monkeypatch.setattr(time_axes, "MAX_TABLED_BUDGET", math.inf)
     times = np.linspace(0, 2, 49)
     angles = np.radians(150) * times / 2
     values = np.stack((0 * angles, 0 * angles, np.sin(angles / 2), np.cos(angles / 2)), axis=1)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from anim.arrays import Bools, Floats
-from anim.optimization.search import time_axes
-from anim.optimization.search.time_axes import SharedAxis, merge_axes
+from anim.optimization.search import axis_merging
+from anim.optimization.search.axis_merging import SharedAxis, merge_axes
 from tests.calls import count_calls
 
 AXIS, TIME = 120.0, 4.0
@@ -104,15 +104,15 @@ def test_axes_are_those_of_a_plain_loop() -> None:
         assert [list(axis.members) for axis in _merged(keep, key_bytes)] == _plain(keep, key_bytes)
 
 
-@pytest.mark.parametrize(("pairs", "calls"), [(1, 4), (170, 3), (time_axes.MAX_STACKED_PAIRS, 1)])
+@pytest.mark.parametrize(("pairs", "calls"), [(1, 4), (170, 3), (axis_merging.MAX_STACKED_PAIRS, 1)])
 def test_axes_of_clips_together_are_those_of_each_alone(
     pairs: int, calls: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also in parts, where all together would take too much memory."""
     alone = [_merged(*each) for each in _several()]
     assert any(1 < len(axes) < 30 for axes in alone)
-    monkeypatch.setattr(time_axes, "MAX_STACKED_PAIRS", pairs)
-    counted = count_calls(monkeypatch, time_axes, "_merge_groups")
+    monkeypatch.setattr(axis_merging, "MAX_STACKED_PAIRS", pairs)
+    counted = count_calls(monkeypatch, axis_merging, "_Merging")
     together = merge_axes(_several(), axis_bytes=AXIS, time_bytes=TIME)
     assert len(counted) == calls
     for some, axes in zip(together, alone, strict=True):
