@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from anim.curves.fitting.key_reduction import KEYS_PER_PART
 
 SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
+MAX_STACKED_VALUES = 30_000  # tracks × keys tabulated in the same arrays, each 32 bytes in each of three arrays
 MAX_JOINT_TABLE_VALUES = 1_000_000  # of several tables in one search: 4 MB
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
@@ -21,29 +23,26 @@ def fits(tracks: int, times: Floats) -> bool:
     return tracks * len(times) * _span(times) <= MAX_TABLE_VALUES
 
 
+class Tabulated(NamedTuple):
+    """Tracks of a clip to tabulate. values: (G, K, C) in metres. times: (K,) s.
+
+    limit: m; a track's errors of long segments may be infinite where those of all shorter ones of a length exceed it.
+    """
+
+    values: Floats
+    times: Floats
+    limit: float
+
+
 class SegmentErrors:
     """Largest errors of linear segments between all pairs of K keys up to a second apart, for G tracks.
 
-    values: (G, K, C) in metres. times: (K,) s. limit: m; larger errors may be approximate.
+    errors: (span, K, G) m: at [n, e, g] the largest distance from the line between keys e - n - 1 and e; infinite
+    without such a key.
     """
 
-    def __init__(self, values: Floats, times: Floats, limit: float) -> None:
-        tracks, count, _ = values.shape
-        span = _span(times)
-        errors = np.empty((span, count, tracks), np.float32)  # in the order of the loop: what it leaves takes no memory
-        bent = np.arange(tracks)
-        components = np.ascontiguousarray(np.moveaxis(values, -1, 0))
-        longest = 0
-        while longest < span and len(bent):
-            longest += 1
-            error = _segment_error(components, times, longest)
-            errors[longest - 1] = np.inf
-            errors[longest - 1, longest:, bent] = error
-            kept = (error <= limit).any(axis=1)  # longer segments of the others nearly all exceed it too
-            if not kept.all():
-                bent, components = bent[kept], components[:, kept]
-        # [e, g, n]: largest distance from the line between keys e - n - 1 and e; infinite without such a key
-        self._errors = errors[:longest].transpose(1, 2, 0)
+    def __init__(self, errors: NDArray[np.float32]) -> None:
+        self._errors = errors.transpose(1, 2, 0)
 
     def __len__(self) -> int:
         """Return the number of keys of each track."""
@@ -61,6 +60,63 @@ class SegmentErrors:
         """
         shares = self._errors[ends, tracks] * (1 / budgets).astype(np.float32)[:, None]
         return np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
+
+
+def tabulate(asked: Sequence[Tabulated]) -> list[SegmentErrors]:
+    """Return the errors of each clip's tracks, computed in the same arrays, so many at a time as a cache holds.
+
+    The errors of a clip do not depend on the others.
+    """
+    found: list[SegmentErrors] = []
+    waiting: list[Tabulated] = []
+    for each in asked:
+        if waiting and _padded_size([*waiting, each]) > MAX_STACKED_VALUES:
+            found += _tabulate(waiting)
+            waiting = []
+        waiting.append(each)
+    return found + (_tabulate(waiting) if waiting else [])
+
+
+def _padded_size(asked: Sequence[Tabulated]) -> int:
+    return sum(len(each.values) for each in asked) * max(len(each.times) for each in asked)
+
+
+def _tabulate(asked: Sequence[Tabulated]) -> list[SegmentErrors]:
+    tracks = [len(each.values) for each in asked]
+    spans, limits = np.array([_span(each.times) for each in asked]), np.array([each.limit for each in asked])
+    # in the order of the loop: what it leaves takes no memory
+    tables = [np.empty((_span(at), len(at), len(values)), np.float32) for values, at, _ in asked]
+    lengths = [0] * len(asked)
+    clip, track = np.repeat(np.arange(len(asked)), tracks), np.concatenate([np.arange(count) for count in tracks])
+    components, times = _padded(asked)
+    length = 0
+    while len(clip):
+        length += 1
+        errors = _segment_errors(components, times, clip, length)
+        edges = np.searchsorted(clip, np.arange(len(asked) + 1)).tolist()
+        for n, (table, first, end) in enumerate(zip(tables, edges, edges[1:], strict=False)):
+            if first < end:
+                table[length - 1] = np.inf
+                table[length - 1, length:, track[first:end]] = errors[first:end, : table.shape[1] - length]
+                lengths[n] = length
+        # longer segments of the others nearly all exceed it too
+        kept = (errors <= limits[clip, None]).any(axis=1) & (spans[clip] > length)
+        if not kept.all():
+            clip, track, components = clip[kept], track[kept], components[:, kept]
+    return [SegmentErrors(table[:longest]) for table, longest in zip(tables, lengths, strict=True)]
+
+
+def _padded(asked: Sequence[Tabulated]) -> tuple[Floats, Floats]:
+    """Values (C, G, K) of all tracks, nan after a clip's last key, and the clips' times (B, K) in s, increasing."""
+    count = max(len(each.times) for each in asked)
+    components = np.full((asked[0].values.shape[2], sum(len(each.values) for each in asked), count), np.nan)
+    times = np.empty((len(asked), count))
+    first = 0
+    for n, (values, at, _) in enumerate(asked):
+        components[:, first : first + len(values), : len(at)] = np.moveaxis(values, -1, 0)
+        times[n] = np.concatenate((at, at[-1] + np.arange(1, count - len(at) + 1)))
+        first += len(values)
+    return components, times
 
 
 def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Bools]:
@@ -154,16 +210,22 @@ def _span(times: Floats) -> int:
     return max(min(max(per_second, SPAN_RANGE[0]), SPAN_RANGE[1], len(times) - 1), 1)
 
 
-def _segment_error(values: Floats, times: Floats, length: int) -> Floats:
-    """Errors of segments over `length` intervals (G, K - length), 0 for neighbors; values: (C, G, K)."""
+def _segment_errors(values: Floats, times: Floats, clip: Ints, length: int) -> Floats:
+    """Errors (G, K - length) of segments over `length` intervals, 0 for neighbors.
+
+    values: (C, G, K). times: (B, K) s. clip: (G,) index of each track's times.
+    """
     starts = values.shape[2] - length
     largest = np.zeros((values.shape[1], starts))
     a = values[..., :starts]
     change = values[..., length:] - a
-    whole = times[length:] - times[:starts]
+    if length == 1:
+        return np.where(np.isnan(change[0]), np.nan, 0.0)
+    whole = times[:, length:] - times[:, :starts]
     error = np.empty_like(change)
     for inner in range(1, length):
-        np.multiply((times[inner : inner + starts] - times[:starts]) / whole, change, out=error)
+        u = (times[:, inner : inner + starts] - times[:, :starts]) / whole
+        np.multiply(u[clip] if len(u) > 1 else u, change, out=error)
         error += a
         error -= values[..., inner : inner + starts]
         error *= error

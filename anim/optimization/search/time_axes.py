@@ -11,7 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import greedy_keys, joint_greedy_keys
 from anim.optimization.search import segment_errors
 from anim.optimization.search.axis_merging import SharedAxis, merge_axes
-from anim.optimization.search.segment_errors import SegmentErrors, fits
+from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, fits
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.tracks.quantization import Encoding
 
@@ -37,7 +37,8 @@ class TimeAxisSearch:
             self._tabled = np.empty(0, np.int64)
         self._is_tabled = np.zeros(len(moved), np.bool_)
         self._is_tabled[self._tabled] = True
-        self._segments = SegmentErrors(self._scaled[self._tabled], source.grid, MAX_TABLED_BUDGET * bound)
+        self.tabulated = Tabulated(self._scaled[self._tabled], source.grid, MAX_TABLED_BUDGET * bound)
+        self.segments: SegmentErrors | None = None
         self._rows: dict[tuple[int, float], Bools] = {}
 
     def scaled(self, keyed: Ints, budgets: Floats) -> Floats:
@@ -52,10 +53,15 @@ class TimeAxisSearch:
         """Return the tracks whose keys under their budgets are not known yet."""
         return np.array([i for i in keyed.tolist() if (i, float(budgets[i])) not in self._rows], np.int64)
 
+    def is_tabled(self, tracks: Ints) -> bool:
+        """Return whether any of some tracks are in the table."""
+        return bool(self._is_tabled[tracks].any())
+
     def from_table(self, tracks: Ints, budgets: Floats) -> tuple[Ints, tuple[SegmentErrors, Ints, Floats]]:
         """Return those of some tracks that are in the table, with what `segment_errors.greedy_keys` takes for them."""
         there = tracks[self._is_tabled[tracks]]
-        return there, (self._segments, np.searchsorted(self._tabled, there), budgets[there])
+        assert self.segments is not None
+        return there, (self.segments, np.searchsorted(self._tabled, there), budgets[there])
 
     def search_others(self, tracks: Ints, budgets: Floats) -> None:
         """Find the keys of those of some tracks that are in no table."""
@@ -77,16 +83,23 @@ def find_axes(name: str, asked: Sequence[Asked]) -> list[list[SharedAxis]]:
 
 def find_keys(asked: Sequence[Asked]) -> None:
     """Find the keys that tracks of several clips require by themselves, those that are not known yet."""
+    new = [layouts.new_tracks(keyed, budgets) for layouts, keyed, budgets in asked]
+    _tabulate([layouts for (layouts, *_), some in zip(asked, new, strict=True) if layouts.is_tabled(some)])
     searches = []
-    for layouts, keyed, budgets in asked:
-        new = layouts.new_tracks(keyed, budgets)
-        layouts.search_others(new, budgets)
-        there, table = layouts.from_table(new, budgets)
-        if len(there):
-            searches.append((layouts, there, budgets, table))
+    for (layouts, _, budgets), some in zip(asked, new, strict=True):
+        layouts.search_others(some, budgets)
+        if layouts.is_tabled(some):
+            searches.append((layouts, budgets, *layouts.from_table(some, budgets)))
     found = segment_errors.greedy_keys([table for *_, table in searches])
-    for (layouts, there, budgets, _), keys in zip(searches, found, strict=True):
+    for (layouts, budgets, there, _), keys in zip(searches, found, strict=True):
         layouts.add(there, budgets, keys)
+
+
+def _tabulate(every: Sequence[TimeAxisSearch]) -> None:
+    """Make the tables of clips that have none yet."""
+    missing = [each for each in every if each.segments is None]
+    for each, table in zip(missing, segment_errors.tabulate([each.tabulated for each in missing]), strict=True):
+        each.segments = table
 
 
 def _merge_by_bytes(asked: Sequence[Asked]) -> list[list[SharedAxis]]:

@@ -14,6 +14,7 @@ from anim.model import Clip, Scene
 from anim.optimization.options import Bounds
 from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.plan import Plan, TrialResult
+from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, tabulate
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.trial import ClipTrials, Trial
@@ -25,6 +26,11 @@ OF = scene()
 POINTS = every_point(OF)
 BOUND = 0.02  # m
 CLIPS = (nodding(), waving(), stepping())  # a shorter and a longer one beside it, of other tracks
+
+
+def table_of(values: Floats, times: Floats, limit: float) -> SegmentErrors:
+    """The segment errors of one clip's tracks (G, K, C)."""
+    return tabulate([Tabulated(values, times, limit)])[0]
 
 
 def stack(*clips: Clip, of: Scene = OF) -> StackedClips:

@@ -13,6 +13,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import greedy_keys
 from anim.optimization.search import segment_errors
 from anim.optimization.search.segment_errors import SPAN_RANGE, SegmentErrors, fits
+from tests.anim.optimization.search.stacks import table_of
 
 
 def _missed(values: Floats, times: Floats, keep: Bools) -> float:
@@ -42,7 +43,7 @@ def _chosen(count: int, inner: tuple[int, ...]) -> Bools:
 def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, budget: float) -> None:
     values, times = _random(seed, count)
     budgets = budget * np.array([1.0, 0.5, 2, 0.01])
-    keep = _keys(SegmentErrors(values, times, np.inf), np.arange(4), budgets)
+    keep = _keys(table_of(values, times, np.inf), np.arange(4), budgets)
     assert keep[:, [0, -1]].all()
     for track in range(4):
         assert _missed(values[track], times, keep[track]) <= budgets[track] * (1 + 1e-5)
@@ -53,7 +54,7 @@ def test_lines_between_kept_keys_keep_each_tracks_budget(seed: int, count: int, 
 def test_no_choice_of_fewer_keys_does(seed: int) -> None:
     """Tried are all of them."""
     values, times = _random(seed, 9)
-    keep = _keys(SegmentErrors(values, times, np.inf), np.arange(4), np.full(4, 1.5))
+    keep = _keys(table_of(values, times, np.inf), np.arange(4), np.full(4, 1.5))
     for track in range(4):
         count = int(keep[track].sum())
         fewer = (_chosen(9, inner) for inner in combinations(range(1, 8), max(count - 3, 0)))
@@ -64,13 +65,13 @@ def test_among_the_fewest_the_one_that_misses_least() -> None:
     """A bow in two lines: the middle key misses least."""
     times = np.linspace(0, 1, 11)
     bow = (times**2)[None, :, None]
-    keep = _keys(SegmentErrors(bow, times, np.inf), np.array([0]), np.array([0.08]))
+    keep = _keys(table_of(bow, times, np.inf), np.array([0]), np.array([0.08]))
     assert np.flatnonzero(keep[0]).tolist() == [0, 5, 10]
 
 
 def test_some_tracks_of_many() -> None:
     values, times = _random(3, 40)
-    table = SegmentErrors(values, times, np.inf)
+    table = table_of(values, times, np.inf)
     every = _keys(table, np.arange(4), np.array([1.0, 2, 3, 4]))
     some = _keys(table, np.array([3, 1]), np.array([4.0, 2]))
     assert (some == every[[3, 1]]).all()
@@ -78,7 +79,7 @@ def test_some_tracks_of_many() -> None:
 
 def test_never_more_keys_than_greedy_ones() -> None:
     values, times = _random(5, 60, tracks=30)
-    fewest = _keys(SegmentErrors(values, times, np.inf), np.arange(30), np.full(30, 2.0)).sum(axis=1)
+    fewest = _keys(table_of(values, times, np.inf), np.arange(30), np.full(30, 2.0)).sum(axis=1)
     greedy = greedy_keys(values / 2.0, times).sum(axis=1)
     assert (fewest <= greedy).all()
     assert fewest.sum() < greedy.sum()
@@ -86,7 +87,7 @@ def test_never_more_keys_than_greedy_ones() -> None:
 
 def test_long_lines_have_a_key_now_and_then() -> None:
     times = np.arange(300.0)
-    keep = _keys(SegmentErrors(times[None, :, None] * np.ones(3), times, np.inf), np.array([0]), np.array([1e-3]))
+    keep = _keys(table_of(times[None, :, None] * np.ones(3), times, np.inf), np.array([0]), np.array([1e-3]))
     at = np.flatnonzero(keep[0])
     assert np.diff(at).max() <= SPAN_RANGE[0]
     assert len(at) == 2 + (299 - 1) // SPAN_RANGE[0]
@@ -97,12 +98,12 @@ def test_parts_of_long_tracks_are_searched_by_themselves(monkeypatch: pytest.Mon
     count = 500
     values, times = _random(4, count, tracks=2)
     budgets = np.array([1.0, 3])
-    keep = _keys(SegmentErrors(values, times, 4.0), np.arange(2), budgets)
+    keep = _keys(table_of(values, times, 4.0), np.arange(2), budgets)
     monkeypatch.setattr(segment_errors, "MAX_JOINT_TABLE_VALUES", 1)
-    assert (_keys(SegmentErrors(values, times, 4.0), np.arange(2), budgets) == keep).all()
+    assert (_keys(table_of(values, times, 4.0), np.arange(2), budgets) == keep).all()
     for start in range(0, count - 1, 200):
         part = slice(start, start + 201)
-        alone = _keys(SegmentErrors(values[:, part], times[part], 4.0), np.arange(2), budgets)
+        alone = _keys(table_of(values[:, part], times[part], 4.0), np.arange(2), budgets)
         assert keep[:, part][:, [0, -1]].all()
         assert (alone == keep[:, part]).all()
 
@@ -110,7 +111,7 @@ def test_parts_of_long_tracks_are_searched_by_themselves(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_and_two_keys_stay(count: int) -> None:
     values, times = _random(1, count)
-    assert _keys(SegmentErrors(values, times, np.inf), np.arange(4), np.full(4, 1e9)).all()
+    assert _keys(table_of(values, times, np.inf), np.arange(4), np.full(4, 1e9)).all()
 
 
 def test_tables_are_kept_within_memory(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,7 +126,7 @@ def test_segments_beyond_the_limit_are_not_looked_at() -> None:
     """Budgets within it lead to the same keys; a noisy track has no long segments, a straight one has all of them."""
     values, times = _random(8, 40)
     values[3] = times[:, None] * np.ones(3)
-    whole, limited = SegmentErrors(values, times, np.inf), SegmentErrors(values, times, 2.0)
+    whole, limited = table_of(values, times, np.inf), table_of(values, times, 2.0)
     budgets = np.full(4, 1.9)
     expected = _keys(whole, np.arange(4), budgets)
     assert (_keys(limited, np.arange(4), budgets) == expected).mean() > 0.98
@@ -138,7 +139,7 @@ def test_segments_beyond_the_limit_are_not_looked_at() -> None:
 def test_a_limit_keeps_the_keys_of_budgets_below_it() -> None:
     values, times = _random(5, 300)
     budgets = np.array([0.5, 1, 0.01, 1e-6])
-    tables = [SegmentErrors(values, times, limit) for limit in (np.inf, 1.0, 1e-6)]
+    tables = [table_of(values, times, limit) for limit in (np.inf, 1.0, 1e-6)]
     whole, limited = (_keys(each, np.arange(4), budgets) for each in tables[:2])
     np.testing.assert_array_equal(limited, whole)
     assert _keys(tables[2], np.arange(4), np.full(4, 1e-6)).all()

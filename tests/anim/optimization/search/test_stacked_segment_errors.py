@@ -9,7 +9,8 @@ import pytest
 
 from anim.arrays import Bools, Floats, Ints
 from anim.optimization.search import segment_errors
-from anim.optimization.search.segment_errors import SegmentErrors, greedy_keys
+from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, greedy_keys, tabulate
+from tests.anim.optimization.search.stacks import table_of
 from tests.calls import count_calls
 
 SHAPES = ((4, 40), (1, 130), (7, 12), (2, 95), (3, 2), (1, 1))  # tracks and keys of each table
@@ -21,10 +22,45 @@ def _asked() -> list[tuple[SegmentErrors, Ints, Floats]]:
     asked = []
     for tracks, count in SHAPES:
         values = np.cumsum(rng.normal(size=(tracks, count, 3)), axis=1)
-        table = SegmentErrors(values, np.cumsum(rng.uniform(0.01, 0.1, count)), np.inf)
+        table = table_of(values, np.cumsum(rng.uniform(0.01, 0.1, count)), np.inf)
         some = rng.permutation(tracks)[: max(tracks - 1, 1)]
         asked.append((table, some, rng.uniform(0.3, 6, len(some))))
     return asked
+
+
+def _tabulated() -> list[Tabulated]:
+    """Tracks of all lengths, some noisy, some with long segments within the limit of their clip."""
+    rng = np.random.default_rng(3)
+    asked = []
+    for number, (tracks, count) in enumerate((*SHAPES, (0, 9))):
+        noise = rng.choice([0.0, 0.01, 1.0], size=(tracks, 1, 1)) * rng.normal(size=(tracks, count, 3))
+        times = np.cumsum(rng.uniform(0.01, 0.1, count))
+        asked.append(Tabulated(times[:, None] * np.ones(3) + noise, times, (np.inf, 0.05, 1e-3)[number % 3]))
+    return asked
+
+
+@pytest.mark.parametrize("values", [1, 400, segment_errors.MAX_STACKED_VALUES])
+def test_errors_of_tracks_do_not_depend_on_those_beside(values: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = [tabulate([each])[0] for each in _tabulated()]
+    monkeypatch.setattr(segment_errors, "MAX_STACKED_VALUES", values)
+    for one, other in zip(tabulate(_tabulated()), alone, strict=True):
+        budgets = np.ones(one._errors.shape[1])
+        found, expected = (each.costs(np.arange(len(budgets)), budgets) for each in (one, other))
+        np.testing.assert_array_equal(found, expected)
+    assert len({each.span for each in alone}) > 4
+
+
+def test_errors_are_those_of_interpolation() -> None:
+    for values, times, limit in _tabulated()[::3]:
+        assert limit == np.inf
+        table = table_of(values, times, limit)
+        for track, value in enumerate(values):
+            for end in range(1, len(times)):
+                for n in range(1, min(table.span, end) + 1):
+                    some = slice(end - n, end + 1)
+                    line = np.stack([np.interp(times[some], times[[end - n, end]], c[[end - n, end]]) for c in value.T])
+                    expected = np.linalg.norm(line.T - value[some], axis=1).max()
+                    assert table._errors[end, track, n - 1] == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
 
 def _plain(table: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:
