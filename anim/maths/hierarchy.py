@@ -118,8 +118,10 @@ def _by_section(local: Floats, parents: Ints, levels: Sequence[Ints], compose: C
 
 
 def _are_neighbors(nodes: Ints) -> bool:
-    """Return whether nodes follow each other in steps of one."""
-    return len(nodes) > 0 and bool((np.diff(nodes) == 1).all())
+    """Return whether nodes (M,) follow each other in steps of one; not without any."""
+    if not len(nodes) or int(nodes[-1]) - int(nodes[0]) != len(nodes) - 1:
+        return False
+    return bool((nodes[1:] - nodes[:-1] == 1).all())
 
 
 def _depth_first(parents: Ints) -> list[int]:

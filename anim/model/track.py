@@ -173,7 +173,13 @@ class Track:
             return NotImplemented
         if self is other:
             return True
-        return self._words == other._words and all(map(_same, self._numbers, other._numbers))
+        return self.storage == other.storage and self.has_same_keys(other)
+
+    def has_same_keys(self, other: Track) -> bool:
+        """Return whether the other track has the same keys and target; its storage may differ."""
+        if self._target_and_interpolation != other._target_and_interpolation:
+            return False
+        return all(map(_same, self._numbers, other._numbers))
 
     def __hash__(self) -> int:
         return hash((self._words, self.values.shape))
@@ -197,7 +203,11 @@ class Track:
 
     @property
     def _words(self) -> tuple[object, ...]:
-        return self.node, self.path, self.interpolation, self.pointer, self.storage
+        return *self._target_and_interpolation, self.storage
+
+    @property
+    def _target_and_interpolation(self) -> tuple[object, ...]:
+        return self.node, self.path, self.interpolation, self.pointer
 
     @property
     def _numbers(self) -> tuple[Floats | None, ...]:

@@ -48,8 +48,7 @@ def changed_clips(read_back: Sequence[Clip], solutions: Mapping[int, Solution]) 
 
 def _is_same(a: Clip, b: Clip) -> bool:
     """Return whether the keys are equal; their formats may differ."""
-    pairs = zip(a.tracks, b.tracks, strict=False)
-    return len(a.tracks) == len(b.tracks) and all(replace(x, storage=y.storage) == y for x, y in pairs)
+    return len(a.tracks) == len(b.tracks) and all(map(Track.has_same_keys, a.tracks, b.tracks))
 
 
 def add_mark(document: Document, clips: Iterable[Clip], options: str) -> Document:

@@ -57,7 +57,7 @@ class KeyInterval(NamedTuple):
 def find_interval(times: Floats, at: Floats) -> KeyInterval:
     """Return the key intervals of times `at` (F,) among keys `times` (K,), clamped to the ends."""
     last = len(times) - 1
-    left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, last)
+    left = np.searchsorted(times[1:], at, side="right")  # the first key before all keys
     right = np.minimum(left + 1, last)
     duration = times[right] - times[left]
     inside = (at > times[left]) & (duration > 0)

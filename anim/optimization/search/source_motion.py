@@ -16,7 +16,7 @@ from anim.optimization.options import Reference
 from anim.optimization.search import playback
 from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.playback import level_world_matrices, required_levels
-from anim.optimization.tracks.clip_ends import closure_sign
+from anim.optimization.tracks.clip_ends import closure_signs
 from anim.sampling import PoseSampler, times
 from anim.sampling.players import sampler
 
@@ -36,7 +36,7 @@ class SourceTrack:
     index: in its clip. values: (W, C) at the measurement times; rotations unit, signs continuous. rest: (C,), of
     rotations with the sign of the first value. middle: (C,), the constant with the smallest error. meters: approximate
     displacement of a point per unit of the value. from_rest, from_middle: m, largest error of rest and middle.
-    closure: s if the last value is s times the first, else 0 (see `closure_sign`).
+    closure: s if the last value is s times the first, else 0 (see `closure_signs`).
     """
 
     index: int
@@ -107,7 +107,7 @@ def analyze_source(
         at,
         np.searchsorted(at, grid),
         moving,
-        np.array([_source_keys(track, grid) for track in tracks]).reshape(len(tracks), len(grid)),
+        _source_keys(tracks, grid),
         answering,
         local,
         world,
@@ -160,15 +160,17 @@ def _max_chord_error(track: Track) -> float:
     return float(playback.arc_distance(playback.steps(track.values).max())) / 2
 
 
-def _source_keys(track: Track, grid: Floats) -> Bools:
-    """Mask of the grid (K,) at the track's keys; all for splines."""
-    if track.interpolation is Interpolation.CUBICSPLINE:
-        return np.ones(len(grid), np.bool_)
-    keys = times.key_times(track.times)
-    keys = keys[(keys >= grid[0]) & (keys <= grid[-1])]
-    found = np.zeros(len(grid), np.bool_)
-    at = np.searchsorted(grid, keys)
-    found[at[grid[at] == keys]] = True
+def _source_keys(tracks: Sequence[Track], grid: Floats) -> Bools:
+    """Mask (G, K) of the grid (K,) at the keys of G tracks; all for splines."""
+    found = np.zeros((len(tracks), len(grid)), np.bool_)
+    for i, track in enumerate(tracks):
+        found[i] = track.interpolation is Interpolation.CUBICSPLINE
+    counts = [len(track.times) for track in tracks]
+    if counts:
+        keys = np.concatenate([track.times for track in tracks]).astype(np.float32).astype(np.float64)
+        at = np.minimum(np.searchsorted(grid, keys), len(grid) - 1)
+        on_grid = grid[at] == keys
+        found[np.repeat(np.arange(len(tracks)), counts)[on_grid], at[on_grid]] = True
     return found
 
 
@@ -200,11 +202,10 @@ def _source_tracks(
         else:
             meters = meters / np.maximum(np.abs(values).min(axis=(1, 2)), 1e-6)
         from_rest, from_middle = (np.sqrt(farthest(values, each)) * meters for each in (rest, middle))
-        for k, (number, node) in enumerate(zip(numbers, nodes, strict=True)):
-            unit = float(meters[k])
-            closure = closure_sign(values[k], chord_tolerance / unit if unit else 0.0)
-            errors = float(from_rest[k]), float(from_middle[k])
-            found[number] = SourceTrack(number, node, path, every[node], rest[k], middle[k], unit, *errors, closure)
+        signs = closure_signs(values, np.where(meters > 0, chord_tolerance / np.where(meters > 0, meters, 1.0), 0.0))
+        numbers_of = zip(meters.tolist(), from_rest.tolist(), from_middle.tolist(), signs.tolist(), strict=True)
+        for k, (number, node, given) in enumerate(zip(numbers, nodes, numbers_of, strict=True)):
+            found[number] = SourceTrack(number, node, path, every[node], rest[k], middle[k], *given)
     return tuple(found[i] for i in free)
 
 

@@ -14,16 +14,20 @@ from anim.arrays import Floats, Ints
 from anim.model import Clip, Interpolation, Track, ValueKind
 
 
-def closure_sign(values: Floats, tolerance: float) -> float:
-    """Return s if the last of the values (K, C) is s · the first within `tolerance`; 0 for none.
+def closure_signs(values: Floats, tolerances: Floats) -> Floats:
+    """Return s (G,) where the last of the values (G, K, C) of a track is s · the first within its tolerance; else 0.
 
-    tolerance: in units of the values. s is −1 only for rotations that end with the opposite sign; callers pass no other
-    values that change sign.
-    ([0 0 0 1] … [0 0 0 −1], 0) → −1
+    tolerances: (G,), in units of the values. s is −1 only for rotations that end with the opposite sign; callers pass
+    no other values that change sign.
+    ([[0 0 0 1] … [0 0 0 −1]], [0]) → [−1]
     """
-    signs = (1.0, -1.0) if values.shape[1] == 4 else (1.0,)
-    sign = min(signs, key=lambda sign: float(np.linalg.norm(values[-1] - sign * values[0])))
-    return sign if np.linalg.norm(values[-1] - sign * values[0]) <= tolerance else 0.0
+    first, last = values[:, 0], values[:, -1]
+    apart = np.linalg.norm(last - first, axis=1)
+    signs = np.where(apart <= tolerances, 1.0, 0.0)
+    if values.shape[2] == 4:
+        opposite = np.linalg.norm(last + first, axis=1)
+        signs = np.where(opposite < apart, np.where(opposite <= tolerances, -1.0, 0.0), signs)
+    return signs
 
 
 def close_ends(keys: Floats, signs: Floats, counts: Ints) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
 import numpy as np
@@ -133,3 +133,11 @@ def test_tracks_and_clips_are_equal_by_their_numbers() -> None:
     assert len({one, same, other}) == 2
     assert Clip("a", (one,)) == Clip("a", (same,))
     assert len({Clip("a", (one,)), Clip("a", (same,)), Clip("a", (other,))}) == 2
+
+
+def test_same_keys_may_be_stored_in_other_formats() -> None:
+    one = track("weights", [0, 1], [[0], [1]])
+    assert one.has_same_keys(replace(one, storage=FRACTIONS))
+    assert one != replace(one, storage=FRACTIONS)
+    others = (replace(one, node=5), replace(one, interpolation=STEP), track("weights", [0, 2], [[0], [1]]))
+    assert not any(one.has_same_keys(each) for each in others)

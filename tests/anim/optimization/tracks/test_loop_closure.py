@@ -17,7 +17,7 @@ from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Track
 from anim.optimization.optimize import optimize
 from anim.optimization.options import Bounds, Drop, Packing, Policy, Request
-from anim.optimization.tracks.clip_ends import close_ends, closure_sign, opened_tracks
+from anim.optimization.tracks.clip_ends import close_ends, closure_signs, opened_tracks
 from tests.clips import STEP, about, clip, track
 from tests.files import glb_of, opened, opened_fixture
 
@@ -35,13 +35,12 @@ def _is_closed(track: Track) -> bool:
 
 
 def test_signs_of_closure() -> None:
-    assert closure_sign(np.array([ZERO, ONE, ZERO]), 0) == 1
-    assert closure_sign(np.array([ZERO, ONE, [0, 0, 1e-3]]), 0) == 0
-    assert closure_sign(np.array([ZERO, ONE, [0, 0, 1e-3]]), 2e-3) == 1
-    assert closure_sign(np.array([ONE, ZERO, [-1.0, 0, 0]]), 0) == 0  # only rotations come back with another sign
-    assert closure_sign(np.array([HERE, AWAY, HERE]), 0) == 1
-    assert closure_sign(np.array([HERE, AWAY, BACK]), 0) == -1
-    assert closure_sign(np.array([HERE, AWAY, AWAY]), 0) == 0
+    moves = np.array([[ZERO, ONE, ZERO], *[[ZERO, ONE, [0, 0, 1e-3]]] * 2, [ONE, ZERO, [-1.0, 0, 0]]])
+    tolerances = np.array([0, 0, 2e-3, 0])
+    assert closure_signs(moves, tolerances).tolist() == [1, 0, 1, 0]  # only rotations come back with another sign
+    turns = np.array([[HERE, AWAY, HERE], [HERE, AWAY, BACK], [HERE, AWAY, AWAY], [HERE, AWAY, [0, 0, 1e-3, -1]]])
+    assert closure_signs(turns, np.zeros(4)).tolist() == [1, -1, 0, 0]
+    assert closure_signs(turns, np.full(4, 2e-3)).tolist() == [1, -1, 0, -1]
 
 
 def test_ends_are_closed_in_the_middle() -> None:
