@@ -184,12 +184,35 @@ class ConcatenatedTracks(TrackGroup):
     values: Floats
     tangents: Tangents | None
 
-    def sample(self, at: Floats) -> Floats:
-        """Return the values (T, F, C) of each track at times of its own: `at` (T, F) in seconds."""
-        return interpolate(self._located(at), self.values, self.tangents, self.interpolation, self.kind)
+    def sample(self, at: Floats, place: KeyInterval | None = None) -> Floats:
+        """Return the values (T, F, C) of each track at times of its own: `at` (T, F) in seconds.
 
-    def _located(self, at: Floats) -> KeyInterval:
-        """Key intervals of the times, as by `find_interval`."""
+        place: of `find_intervals` or `intervals_of_rows`, if known.
+        """
+        place = place or self.find_intervals(at)
+        return interpolate(place, self.values, self.tangents, self.interpolation, self.kind)
+
+    def is_inside(self, at: Floats) -> Bools:
+        """Return the mask (T, F) of the times (T, F) from each track's first key on and before its last."""
+        first, last = self.times[self.starts], self.times[self.starts + self.counts - 1]
+        return np.asarray((at >= first[:, None]) & (at < last[:, None]))
+
+    def intervals_of_rows(self, at: Floats, rows: Ints) -> KeyInterval:
+        """Return the key intervals (T, F) of times in `rows` (T,) of `at` (B, F) s.
+
+        They are found once per time axis and row.
+        """
+        pairs: dict[tuple[TimeAxis, int], int] = {}
+        axes = [track.time_axis for track in self.tracks]
+        number = np.array([pairs.setdefault(pair, len(pairs)) for pair in zip(axes, rows.tolist(), strict=True)])
+        if 2 * len(pairs) > len(self.tracks):
+            return self.find_intervals(at[rows])
+        found = [find_interval(axis.times, at[row]) for axis, row in pairs]
+        left, right, u, duration = (np.stack(parts)[number] for parts in zip(*found, strict=True))
+        return KeyInterval(left + self.starts[:, None], right + self.starts[:, None], u, duration)
+
+    def find_intervals(self, at: Floats) -> KeyInterval:
+        """Return the key intervals (T, F) of the times `at` (T, F) s, as by `find_interval`."""
         last = self.counts[:, None] - 1
         in_track = np.clip(self._count_keys(at) - 1, 0, last)
         left = self.starts[:, None] + in_track

@@ -18,8 +18,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.errors import RangeError, check_type
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Skeleton, ValueKind
-from anim.sampling.batch import Batch, MixedBatch
-from anim.sampling.pose import PoseSampler, Sampler, sample_batch
+from anim.sampling.pose import PoseSampler, Sampler, Tracks, sample_batch
 from anim.sampling.track import KeyInterval
 
 THREE_NLERP_DOT = 0.9995  # three.js r187, Quaternion.slerpFlat: from this dot product on the chord, normalized
@@ -68,8 +67,8 @@ def sampler(player: str) -> Sampler:
     return lambda batch, at, place: _sample_batch(chosen, batch, at, place)
 
 
-def _sample_batch(player: PlayerModel, batch: Batch | MixedBatch, at: Floats, place: KeyInterval) -> Floats:
-    """Values (F, G, C) of tracks; players differ in LINEAR and STEP rotations only."""
+def _sample_batch(player: PlayerModel, batch: Tracks, at: Floats, place: KeyInterval) -> Floats:
+    """Values as of `sample_batch`; players differ in LINEAR and STEP rotations only."""
     if batch.kind is not ValueKind.ROTATION or batch.interpolation is Interpolation.CUBICSPLINE:
         return batch.sample(at, place)
     start = batch.values[place.left]

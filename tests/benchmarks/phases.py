@@ -47,7 +47,7 @@ WATCHED = {
         *READING,
         ("anim.optimization.optimize", "find_constants", "analysis"),
         ("anim.optimization.clip_optimizer", "build_context", "analysis"),
-        ("anim.optimization.search.lockstep", "analyze_source", "analysis"),
+        ("anim.optimization.search.lockstep", "analyze_sources", "analysis"),
         ("anim.optimization.search.lockstep", "StackedClips", "analysis"),
         ("anim.optimization.search.lockstep", "ClipTrials", "analysis"),
         ("anim.optimization.search.lockstep", "BoundUsage", "analysis"),

@@ -12,7 +12,7 @@ from anim.arrays import Floats
 from anim.maths import hierarchy
 from anim.model import Clip, Skeleton
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import sample_world_matrices
+from anim.sampling.clips import sample_world_matrices
 
 MIN_DISPLACEMENT_PER_PATH = 0.7
 

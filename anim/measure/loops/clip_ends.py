@@ -11,7 +11,7 @@ from anim.arrays import Floats
 from anim.measure.error import orientation_probes
 from anim.model import Clip, Skeleton
 from anim.sampling.batch import ConcatenatedTracks
-from anim.sampling.pose import sample_world_matrices
+from anim.sampling.clips import sample_world_matrices
 from anim.sampling.times import FLOAT32_SPACING, MAX_JUMP_S
 
 # Rows are differences, columns the times start, just after it, one probe later, one frame later, and the same

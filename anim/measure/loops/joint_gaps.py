@@ -14,7 +14,7 @@ from anim.measure.loops.carried_distance import carried_distances
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Pose
-from anim.sampling.pose import sample_clips
+from anim.sampling.clips import sample_clips
 
 
 class JointGap(NamedTuple):

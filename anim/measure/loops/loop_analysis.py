@@ -24,7 +24,7 @@ from anim.measure.loops.loop_criteria import (
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip
-from anim.sampling.pose import sample_world_matrices
+from anim.sampling.clips import sample_world_matrices
 
 INVISIBLE_GAP_PER_FRAME = 0.1  # of the usual motion per frame: a gap between those two is visible above this
 MAX_COUNT = 10**12  # frames that indices in float64 tell apart

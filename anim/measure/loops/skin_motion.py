@@ -15,7 +15,8 @@ from anim.measure.error.surface import Surface, has_vertices, morph_points, skin
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Scene
-from anim.sampling.pose import rest_world, sample_pose, sample_world_matrices
+from anim.sampling.clips import sample_world_matrices
+from anim.sampling.pose import rest_world, sample_pose
 from anim.sampling.world import world_by_node
 
 MOTION = np.array([-1.0, 1])  # weights of two frames: the motion between them

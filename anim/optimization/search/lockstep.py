@@ -15,7 +15,8 @@ from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.context import Context
 from anim.optimization.search.plan import TrialResult
 from anim.optimization.search.search import Search, search
-from anim.optimization.search.source_motion import SourceMotion, analyze_source
+from anim.optimization.search.source_analysis import FreeTracks, analyze_sources
+from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.search.stacked_clips import StackedClips
 from anim.optimization.search.trial import ClipTrials, Trial
 from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION, TrialBatch
@@ -47,7 +48,7 @@ class SearchResult(NamedTuple):
 
 def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[SearchResult | None]:
     """Return the result of each clip's search; None without one within all bounds."""
-    clips = StackedClips(context.skeleton, [_analyze(context, each) for each in requests], context.points)
+    clips = StackedClips(context.skeleton, _analyze(context, requests), context.points)
     trials = [
         ClipTrials(source, context.coding, each.bound, each.droppable, each.shared, num_clips=len(requests))
         for source, each in zip(clips.sources, requests, strict=True)
@@ -66,15 +67,13 @@ def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Ef
     ]
 
 
-def _analyze(context: Context, request: SearchRequest) -> SourceMotion:
-    return analyze_source(
+def _analyze(context: Context, requests: Sequence[SearchRequest]) -> list[SourceMotion]:
+    return analyze_sources(
         context.skeleton,
-        request.clip,
-        request.free,
+        [FreeTracks(each.clip, each.free, CHORD_BOUND_FRACTION * each.bound) for each in requests],
         context.points,
         context.answering,
         reference=context.policy.reference,
-        chord_tolerance=CHORD_BOUND_FRACTION * request.bound,
     )
 
 

@@ -14,7 +14,8 @@ from anim.maths import quaternion
 from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.plan import Plan, RotationTarget, TrackAction, TrialResult
 from anim.optimization.search.size_estimate import SizeEstimate
-from anim.optimization.search.source_motion import PATHS, SourceMotion, farthest
+from anim.optimization.search.source_analysis import farthest
+from anim.optimization.search.source_motion import PATHS, SourceMotion
 from anim.optimization.search.time_axes import TimeAxisSearch
 from anim.optimization.search.trial_cache import TrialCache
 from anim.optimization.tracks.quantization import Encoding

@@ -15,7 +15,8 @@ from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.lockstep import SearchResult, search_clips
 from anim.optimization.search.plan import Solution
-from anim.optimization.search.source_motion import SourceMotion, analyze_source
+from anim.optimization.search.source_analysis import FreeTracks, analyze_sources
+from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import about, clip, track
@@ -111,7 +112,8 @@ def truth_of(
     """What a clip does to points. free: indices of the tracks that may change; all by default."""
     below = AnsweringPoints(points, of.skeleton.parents)
     free = range(len(what.tracks)) if free is None else free
-    return analyze_source(of.skeleton, what, free, points, below, reference=reference, chord_tolerance=1e-6)
+    (found,) = analyze_sources(of.skeleton, [FreeTracks(what, free, 1e-6)], points, below, reference=reference)
+    return found
 
 
 def setting_of(

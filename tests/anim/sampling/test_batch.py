@@ -7,11 +7,14 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from anim.model import TimeAxis
 from anim.sampling import batch as module
-from anim.sampling.batch import concatenate
-from anim.sampling.track import sample
+from anim.sampling.batch import batches, concatenate
+from anim.sampling.players import PLAYERS, sampler
+from anim.sampling.track import find_interval, sample
 from tests import clips
 from tests.anim.operations.tracks import TRACKS
+from tests.calls import count_calls
 from tests.clips import CUBICSPLINE
 
 SINGLE = clips.track("translation", [2.0], [[1.0, 2.0, 3.0]])
@@ -32,6 +35,33 @@ def test_each_track_is_sampled_at_its_own_times_as_it_is_alone(limit: int, monke
             np.testing.assert_allclose(values[i], sample(ALL[number], at[number]), rtol=0, atol=1e-15)
             seen.append(number)
     assert sorted(seen) == list(range(len(ALL)))
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_intervals_are_found_once_per_axis_and_row(shared: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same as of every track by itself, also where axes or rows are shared."""
+    axis = TimeAxis([0.0, 0.5, 2])
+    axes = [axis] * 6 if shared else [TimeAxis([0.0, 0.5, 2 + n]) for n in range(6)]
+    (group,) = concatenate([clips.track("translation", each, np.ones((3, 3))) for each in axes])
+    at, rows = np.array([[-1, 0, 0.25, 2, 9], [0.5, 0.75, 1, 1, 3.0]]), np.array([0, 0, 1, 0, 1, 1])
+    counted = count_calls(monkeypatch, module, "find_interval")
+    found, expected = group.intervals_of_rows(at, rows), group.find_intervals(at[rows])
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert len(counted) == (2 if shared else 0)
+
+
+@pytest.mark.parametrize("player", list(PLAYERS))
+def test_players_sample_concatenated_tracks_as_single_ones(player: str) -> None:
+    at = np.linspace(-1, 4, 33)
+    used = sampler(player)
+    for group in concatenate(ALL):
+        times = np.tile(at, (len(group.tracks), 1))
+        values = used(group, times, group.find_intervals(times))
+        for i, each in enumerate(group.tracks):
+            (single,) = batches([each])
+            expected = used(single, at, find_interval(each.times, at))[:, 0]
+            np.testing.assert_allclose(values[i], expected, rtol=0, atol=1e-15)
 
 
 def test_keys_are_searched_as_they_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,8 +15,9 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton, TimeAxis
 from anim.sampling import rest_pose, sample_pose, world_matrices
 from anim.sampling.batch import lazy_batches
+from anim.sampling.clips import sample_world_matrices
 from anim.sampling.players import PLAYERS, sampler
-from anim.sampling.pose import PoseSampler, sample_world_matrices
+from anim.sampling.pose import PoseSampler
 from anim.sampling.track import find_interval, sample
 from fixtures.broken.pieces import text
 from tests.clips import about, clip, skeleton, track

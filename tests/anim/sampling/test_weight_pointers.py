@@ -11,7 +11,8 @@ import pytest
 
 from anim.arrays import Floats
 from anim.model import Clip, Interpolation, MorphedNode, Skeleton, Track
-from anim.sampling.pose import sample_clips, sample_pose
+from anim.sampling.clips import sample_clips
+from anim.sampling.pose import sample_pose
 from anim.sampling.track import sample
 from anim.sampling.weight_pointers import ineffective_weight_pointers, resolve_weight_pointers
 from tests.clips import skeleton

@@ -19,7 +19,8 @@ from anim.measure.loops.loop_analysis import LoopKind, analyze_loop, analyze_loo
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene
-from anim.sampling import pose, sample_pose, world_matrices
+from anim.sampling import clips as sampled_clips
+from anim.sampling import sample_pose, world_matrices
 from anim.skinning.bake import bake
 from tests.anim.skinning.scenes import looped, random_scene
 from tests.calls import count_calls
@@ -288,7 +289,7 @@ def test_clips_are_analyzed_together(monkeypatch: pytest.MonkeyPatch) -> None:
     kinds = [_swinging(), _swinging(j1=5), longer, _swinging(j1=150), clip(track("scale", [0.0], [[1.0, 1, 1]]))]
     skin = SkinMotion(CHAIN)
     alone = [analyze_loop(skin, each) for each in kinds]
-    counted = count_calls(monkeypatch, pose, "_sample_parts")
+    counted = count_calls(monkeypatch, sampled_clips, "_sample_parts")
     found = analyze_loops(skin, kinds, [-1] * 5)
     few = len(counted)
     assert analyze_loops(skin, kinds * 8, [-1] * 40) == found * 8

@@ -9,10 +9,12 @@ from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.model import Scene
 from anim.optimization.options import Reference
+from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.playback import level_world_matrices, required_levels
+from anim.optimization.search.source_analysis import FreeTracks, analyze_sources
 from anim.optimization.search.source_motion import PATHS, key_grid, measurement_times
 from anim.sampling import sample_pose, world_matrices
-from tests.anim.optimization.making import every_point, scene, truth_of, turning, waving
+from tests.anim.optimization.making import every_point, nodding, scene, stepping, truth_of, turning, waving
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
 
 RNG = np.random.default_rng(2)
@@ -136,3 +138,31 @@ def test_chords_are_asked_for_where_they_leave_the_arc() -> None:
             mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
             assert source.chords[1] == pytest.approx(mixed, abs=1e-12)
             assert np.abs(source.chords[1] - source.local[1][1]).max() > 0.001
+
+
+@pytest.mark.parametrize("reference", list(Reference))
+def test_clips_together_are_analyzed_as_each_alone(reference: Reference) -> None:
+    """Of other durations, tracks and free tracks; one of them with chords."""
+    of = scene(scale_shear=0.2)
+    points = every_point(of)
+    bent = clip(track("rotation", [0, 3.0], about("z", [0, 170]), node=1), *waving().tracks[2:], name="bent")
+    clips = [nodding(), bent, clip(track("scale", [0.5], np.ones((1, 3)), node=2)), waving(), stepping()]
+    asked = [FreeTracks(each, range(n % 2, len(each.tracks)), 1e-6) for n, each in enumerate(clips)]
+    below, needed = (
+        AnsweringPoints(points, of.skeleton.parents),
+        np.concatenate(required_levels(of.skeleton, points.nodes)),
+    )
+    together = analyze_sources(of.skeleton, asked, points, below, reference=reference)
+    for each, found in zip(asked, together, strict=True):
+        (alone,) = analyze_sources(of.skeleton, [each], points, below, reference=reference)
+        for name in ("grid", "at", "on_grid", "own", "chords"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))
+        pairs = ((*each.local, each.world[needed]) for each in (found, alone))
+        for one, other in zip(*pairs, strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-14)
+        assert len(found.moving) == len(each.free)
+        for mine, own in zip(found.moving, alone.moving, strict=True):
+            assert (mine.index, mine.node, mine.path, mine.closure) == (own.index, own.node, own.path, own.closure)
+            for name in ("values", "rest", "middle", "meters", "from_rest", "from_middle"):
+                np.testing.assert_allclose(getattr(mine, name), getattr(own, name), rtol=1e-12, atol=1e-14)
+    assert [each.chords is None for each in together].count(True) < len(together)
