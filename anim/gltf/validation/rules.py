@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from typing import Any, TypeAlias
 
 from anim.errors import FormatError
@@ -42,7 +43,7 @@ class ObjectRule:
 
     def passes(self, values: Sequence[Any]) -> bool:
         """Return True if all values pass, by property: in half the time of the checks one by one."""
-        if self.whole is not None or not set(map(type, values)) <= {dict}:
+        if not set(map(type, values)) <= {dict}:
             return False
         for key in self.properties.keys() | self.required:
             column = [value[key] for value in values if key in value]
@@ -50,7 +51,77 @@ class ObjectRule:
                 return False
             if column and not _pass(self.properties.get(key), column):
                 return False
-        return True
+        return self.whole is None or _none_refused(self.whole, values)
+
+
+def _none_refused(check: Check, values: Sequence[Any]) -> bool:
+    try:
+        for value in values:
+            check(value)
+    except FormatError:
+        return False
+    return True
+
+
+class ListRule:
+    """Rule for an array of values that pass a rule."""
+
+    def __init__(self, rule: Check) -> None:
+        self.rule = rule
+
+    def __call__(self, value: Any) -> None:
+        of_type(value, list, "an array")
+        check_items(value, self.rule, "")
+
+    def passes(self, values: Sequence[Any]) -> bool:
+        """Return True if all of one or more arrays pass: their values together, not array by array."""
+        if set(map(type, values)) != {list}:
+            return False
+        together = list(chain.from_iterable(values))
+        return not together or _pass(self.rule, together)
+
+
+class MapRule:
+    """Rule for an object of any keys with values that pass a rule."""
+
+    def __init__(self, rule: Check) -> None:
+        self.rule = rule
+
+    def __call__(self, value: Any) -> None:
+        of_type(value, dict, "an object")
+        for key, item in value.items():
+            check_property(key, self.rule, item)
+
+    def passes(self, values: Sequence[Any]) -> bool:
+        """Return True if all of one or more objects pass: their values together, not object by object."""
+        if set(map(type, values)) != {dict}:
+            return False
+        together = list(chain.from_iterable([value.values() for value in values]))
+        return not together or _pass(self.rule, together)
+
+
+class Numbers:
+    """Rule for an array of finite numbers, of length `count` unless None."""
+
+    def __init__(self, count: int | None) -> None:
+        self.count = count
+
+    def __call__(self, value: Any) -> None:
+        of_type(value, list, "an array")
+        if self.count is not None and len(value) != self.count:
+            raise FormatError(f"has {len(value)} numbers (expected {self.count})")
+        for item in value:
+            if (type(item) is not float and type(item) is not int) or not -MAX_NUMBER < item < MAX_NUMBER:
+                raise FormatError(f"holds {_name(item)} (expected finite numbers)")
+
+    def passes(self, values: Sequence[Any]) -> bool:
+        """Return whether all of one or more arrays pass."""
+        if set(map(type, values)) != {list} or (self.count is not None and set(map(len, values)) != {self.count}):
+            return False
+        together = list(chain.from_iterable(values))
+        if not set(map(type, together)) <= {int, float}:
+            return False
+        return all(-MAX_NUMBER < item < MAX_NUMBER for item in together)  # min and max pass over NaN
 
 
 class WholeNumber:
@@ -101,13 +172,16 @@ class OfType:
         return set(map(type, values)) == {self.kind}
 
 
+Columnwise = (
+    ObjectRule | ListRule | MapRule | Numbers | WholeNumber | OneOf | OfType
+)  # rules that check many values at once
 text = OfType(str, "a string")
 boolean = OfType(bool, "true or false")
 
 
 def _pass(rule: Check | None, values: Sequence[Any]) -> bool:
     """Return True if all of one or more values pass, False if some may not."""
-    return rule is None or (isinstance(rule, ObjectRule | WholeNumber | OneOf | OfType) and rule.passes(values))
+    return rule is None or (isinstance(rule, Columnwise) and rule.passes(values))
 
 
 def check_property(key: str, rule: Check, value: Any) -> None:
@@ -137,22 +211,13 @@ def _join_path(error: FormatError) -> str:
 def list_of(rule: Check) -> Check:
     """Return a check for an array of values that pass a rule."""
 
-    def check_list(value: Any) -> None:
-        of_type(value, list, "an array")
-        check_items(value, rule, "")
-
-    return check_list
+    return ListRule(rule)
 
 
 def map_of(rule: Check) -> Check:
     """Return a check for an object of any keys with values that pass a rule."""
 
-    def check_map(value: Any) -> None:
-        of_type(value, dict, "an object")
-        for key, item in value.items():
-            check_property(key, rule, item)
-
-    return check_map
+    return MapRule(rule)
 
 
 def index(of: str, count: int) -> Check:
@@ -176,15 +241,7 @@ def one_of(*allowed: int) -> Check:
 def numbers(count: int | None) -> Check:
     """Return a check for an array of finite numbers, of length `count` unless None."""
 
-    def check_numbers(value: Any) -> None:
-        of_type(value, list, "an array")
-        if count is not None and len(value) != count:
-            raise FormatError(f"has {len(value)} numbers (expected {count})")
-        for item in value:
-            if (type(item) is not float and type(item) is not int) or not -MAX_NUMBER < item < MAX_NUMBER:
-                raise FormatError(f"holds {_name(item)} (expected finite numbers)")
-
-    return check_numbers
+    return Numbers(count)
 
 
 def number(value: Any) -> None:
