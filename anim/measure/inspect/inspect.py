@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -49,9 +49,10 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
         for n, clip in enumerate(looked_at)
     )
     reports: list[ClipReport] = []
+    makers: list[partial[ClipReport]] = []
     for n, i in enumerate(numbers):
-        report = next(measured) if first[n] == n else reports[first[n]]
-        reports.append(_with_costs(report, i, clips[i].name, costs[i], packed, contents.file_bytes))
+        makers.append(next(measured) if first[n] == n else makers[first[n]])
+        reports.append(_with_costs(makers[n], i, clips[i].name, costs[i], packed, contents.file_bytes))
     skins = range(len(json_array(json, "skins")))
     using = _instances_by_skin(document, scene)
     return Facts(
@@ -78,12 +79,11 @@ def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]
 
 
 def _with_costs(
-    report: ClipReport, number: int, name: str, cost: storage_cost.StorageCost, packed: float, file_bytes: int
+    make: partial[ClipReport], number: int, name: str, cost: storage_cost.StorageCost, packed: float, file_bytes: int
 ) -> ClipReport:
-    """The report of a clip with equal tracks under its own index and name, with its own bytes."""
+    """The report of a clip under its own index and name, with its own bytes."""
     stored_bytes = round(packed * cost.data)
-    return replace(
-        report,
+    return make(
         index=number,
         name=name,
         data_bytes=cost.data,
@@ -102,17 +102,16 @@ def _clip(
     counted: TrackStats,
     *,
     tracks: bool,
-) -> ClipReport:
-    """The report of a clip, without index and bytes."""
+) -> partial[ClipReport]:
+    """The report of clips with these tracks, still to be called with the index, name and bytes of each."""
     start, end = clip.start, clip.end
     counted = _with_end(clip, counted)
     splines = np.array([track.interpolation is Interpolation.CUBICSPLINE for track in clip.tracks], np.bool_)
     keys = np.array([len(track.values) for track in clip.tracks], np.int64)
     interpolations = Counter([track.interpolation for track in clip.tracks])
     estimated = frame_rate.estimate_frame_rate(clip.key_times)
-    return ClipReport(
-        index=0,
-        name=clip.name,
+    return partial(
+        ClipReport,
         start_s=start,
         end_s=end,
         duration_s=end - start,
@@ -121,10 +120,6 @@ def _clip(
         keys=int(keys.sum()),
         frame_rate_fps=estimated.fps if estimated else None,
         frame_rate_regular=estimated.regular if estimated else None,
-        data_bytes=0,
-        stored_bytes=0,
-        json_bytes=0,
-        share=0.0,
         constant_tracks=int(counted.constant.sum()),
         no_effect_tracks=int(counted.no_effect.sum()),
         repeating_tracks=_repeating(counted, keys > np.where(splines, 2, 1), has_end=end > start),
