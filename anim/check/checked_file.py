@@ -84,9 +84,13 @@ class CheckedFile:
 
     def have_common_root(self, nodes: Sequence[int]) -> bool:
         """Return whether some node is above all of these, or one of them."""
+        return len(set(self._roots[nodes].tolist())) == 1  # np.unique imports much
+
+    @cached_property
+    def _roots(self) -> Ints:
+        """The number (N,) of each node's tree in depth-first order."""
         first, _ = self.subtrees
-        roots = np.sort(first[self.skeleton.parents < 0])
-        return len(set(np.searchsorted(roots, first[nodes], side="right").tolist())) == 1  # np.unique imports much
+        return np.searchsorted(np.sort(first[self.skeleton.parents < 0]), first, side="right")
 
     @cached_property
     def scales(self) -> TrackTable:

@@ -14,7 +14,7 @@ from anim.gltf.validation.animation_storage import unbounded
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield one occurrence for all accessors."""
-    found: set[int] = set().union(*(unbounded(file.json, each) for each in json_array(file.json, "animations")))
+    found = unbounded(file.json, *json_array(file.json, "animations"))
     if found:
         problem = f"{len(found)} key time accessors without min and max"
         yield Occurrence("animations", f"/accessors/{min(found)}", len(found), problem=problem)

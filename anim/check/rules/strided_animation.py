@@ -14,7 +14,7 @@ from anim.gltf.validation.animation_storage import strided
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield one occurrence for all accessors."""
-    found: set[int] = set().union(*(strided(file.json, each) for each in json_array(file.json, "animations")))
+    found = strided(file.json, *json_array(file.json, "animations"))
     if found:
         yield Occurrence("animations", f"/accessors/{min(found)}", len(found))
 

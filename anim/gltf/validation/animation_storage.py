@@ -21,15 +21,17 @@ def unused_samplers(animation: Json) -> set[int]:
     return set(range(len(animation["samplers"]))) - {channel["sampler"] for channel in animation["channels"]}
 
 
-def unbounded(json: Json, animation: Json) -> set[int]:
-    """Return the indices of a clip's accessors of key times without min and max."""
+def unbounded(json: Json, *animations: Json) -> set[int]:
+    """Return the indices of clips' accessors of key times without min and max."""
     accessors = json_array(json, "accessors")
-    return {n for s in animation["samplers"] if not {"min", "max"} <= accessors[n := s["input"]].keys()}
+    inputs = {sampler["input"] for animation in animations for sampler in animation["samplers"]}
+    return {i for i in inputs if not {"min", "max"} <= accessors[i].keys()}
 
 
-def strided(json: Json, animation: Json) -> set[int]:
-    """Return the indices of a clip's accessors in buffer views with byteStride (for vertex attributes)."""
-    return with_stride(json, {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")})
+def strided(json: Json, *animations: Json) -> set[int]:
+    """Return the indices of clips' accessors in buffer views with byteStride (for vertex attributes)."""
+    samplers = [sampler for animation in animations for sampler in animation["samplers"]]
+    return with_stride(json, {sampler[key] for sampler in samplers for key in ("input", "output")})
 
 
 def with_stride(json: Json, numbers: Iterable[int]) -> set[int]:
