@@ -29,19 +29,17 @@ def _skeleton(document: Document, parents: Sequence[int]) -> Skeleton:
     nodes = json_array(document.json, "nodes")
     n = len(nodes)
     translation, rotation, scale = np.zeros((n, 3)), np.tile((0.0, 0.0, 0.0, 1.0), (n, 1)), np.ones((n, 3))
+    for key, values in (("translation", translation), ("scale", scale)):
+        if having := [i for i, node in enumerate(nodes) if key in node]:
+            values[having] = [nodes[i][key] for i in having]
     sheared: dict[int, Floats] = {}
     for i, node in enumerate(nodes):
-        if "matrix" in node:
+        if "matrix" in node:  # without the other three, by the schema
             translation[i], rotation[i], scale[i], whole = node_matrix.decompose(node["matrix"])
             if whole is not None:
                 sheared[i] = whole
-            continue
-        if "translation" in node:
-            translation[i] = node["translation"]
-        if "rotation" in node:
+        elif "rotation" in node:
             rotation[i] = _unit(node["rotation"], i)
-        if "scale" in node:
-            scale[i] = node["scale"]
     return Skeleton(
         tuple(node.get("name", "") for node in nodes),
         np.array(parents, np.int64),
