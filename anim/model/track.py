@@ -165,7 +165,7 @@ class Track:
 
         Nothing is checked again: files have the same keys on thousands of nodes.
         """
-        return Track.unchecked(node, *(getattr(self, name) for name in _COPIED))
+        return Track.unchecked(node, *_copied(self))
 
     def __eq__(self, other: object) -> bool:
         """Return whether the other track has the same keys, target and storage."""
@@ -240,7 +240,7 @@ class Track:
         return f"Track({target}, {self.interpolation}, keys={len(self.times)}, {span})"
 
 
-_COPIED = tuple(each.name for each in fields(Track) if each.init and each.name != "node")
+_copied = operator.attrgetter(*(each.name for each in fields(Track) if each.init and each.name != "node"))
 
 
 def _same(one: Floats | None, other: Floats | None) -> bool:
