@@ -33,8 +33,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from anim.arrays import Floats
+from anim.arrays import Floats, freeze
 from anim.errors import FormatError
 from anim.exchange.euler.baked_keys import shift_to_zero
 from anim.exchange.euler.convention import PartialConvention, merge_strict, parse_convention, require_complete
@@ -225,7 +226,7 @@ def _read_frames(file: _File, drafts: _NodeBuilders, later: float) -> None:
     columns = np.array([_row_numbers(cells) for _, cells in file.rows]).T.copy()
     times = columns[0]
     check_times(times, [line for line, _ in file.rows])
-    times, axes = times + later, dict[bytes, TimeAxis]()
+    times, axes = times + later, dict[bytes, tuple[TimeAxis, NDArray[np.uint8]]]()  # and modes, by keys that are there
     is_there = ~np.isnan(columns)
     is_full = is_there.all(axis=1).tolist()
     for column, title in enumerate(file.header[1:], 1):
@@ -238,10 +239,10 @@ def _read_frames(file: _File, drafts: _NodeBuilders, later: float) -> None:
         if content not in axes:
             if not there.any():
                 continue
-            axes[content] = TimeAxis(times[there])
+            axes[content] = TimeAxis(times[there]), freeze(uniform_modes(int(there.sum()), mode))
         values = columns[column] if is_full[column] else columns[column][there]
-        axis = axes[content]
-        draft.add(slot, Curve(axis, values * draft.unit(slot), uniform_modes(len(axis), mode)))
+        axis, modes = axes[content]
+        draft.add(slot, Curve(axis, freeze(values * draft.unit(slot)), modes))
 
 
 def _faults(file: _File) -> dict[int, tuple[str, int]]:

@@ -9,6 +9,7 @@ import pytest
 
 from anim.check import checked_file
 from tests.anim.check.cases import checked, edited
+from tests.calls import count_calls
 
 
 def _append_forest(json: dict[str, Any], parents: list[int]) -> None:
@@ -23,9 +24,7 @@ def test_common_roots_are_those_of_walks(monkeypatch: pytest.MonkeyPatch) -> Non
     chance = np.random.default_rng(3)
     parents = [int(chance.integers(-1, i)) if i % 5 else -1 for i in range(40)]
     file = checked(edited(lambda json: _append_forest(json, parents)))
-    searches = []
-    search = checked_file.find_subtrees
-    monkeypatch.setattr(checked_file, "find_subtrees", lambda nodes: searches.append(1) or search(nodes))
+    searches = count_calls(monkeypatch, checked_file, "find_subtrees")
 
     def root(node: int) -> int:
         above = int(file.skeleton.parents[node])
