@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from anim.measure.inspect import storage_cost
+from anim.measure.inspect import frame_rate, storage_cost
 from anim.show.plots import polylines, track_selection
 from anim.skinning import chunk_pipeline
 from anim.skinning.analysis.inbetween_error import InbetweenMetric
@@ -108,3 +108,13 @@ def test_accessors_that_clips_share_are_described_once(
     shared = report["clips"][0]["json_bytes"] * CLIPS - report["animation_json_bytes"]
     assert costs[0] < costs[-1] == costs[0] + len("c299") - len("c0")
     assert shared > 0
+
+
+def test_the_frame_rate_of_shared_times_is_estimated_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.clips_different(30))
+    estimates = count_calls(monkeypatch, frame_rate, "estimate_frame_rate")
+    report = json.loads(call("inspect", tmp_path / "in.glb", "--format", "json").product())
+    assert [clip["frame_rate_fps"] for clip in report["files"][0]["clips"]] == [2] * 30
+    assert len(estimates) == 1

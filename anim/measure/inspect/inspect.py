@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -19,8 +19,9 @@ from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Clip, Interpolation, Scene, Skeleton, Track
+from anim.model import Clip, Interpolation, Scene, Skeleton, TimeAxis, Track
 from anim.model.scene import MeshInstance
+from anim.model.time_axis import merge_times
 from anim.sampling.batch import ConcatenatedTracks, concatenate
 
 
@@ -44,8 +45,9 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
     stored_bytes = min(stored(document), cost.data)
     packed = stored_bytes / cost.data if cost.data else 1.0
     counts = (counted.of_tracks(slice(ends[n], ends[n + 1])) for n in range(len(looked_at)))
+    rate = cache(_frame_rate)  # by time axes, which clips often share
     measured = (
-        _clip(clip, ways[n], seams[n], measured_on, skeleton, next(counts), tracks=tracks)
+        _clip(clip, ways[n], seams[n], rate(clip.time_axes), measured_on, skeleton, next(counts), tracks=tracks)
         for n, clip in enumerate(looked_at)
     )
     reports: list[ClipReport] = []
@@ -97,6 +99,7 @@ def _clip(
     clip: Clip,
     way: root_motion.RootMotion,
     seam: Seam,
+    estimated: frame_rate.FrameRate | None,
     measured_on: str,
     skeleton: Skeleton,
     counted: TrackStats,
@@ -109,7 +112,6 @@ def _clip(
     splines = np.array([track.interpolation is Interpolation.CUBICSPLINE for track in clip.tracks], np.bool_)
     keys = np.array([len(track.values) for track in clip.tracks], np.int64)
     interpolations = Counter([track.interpolation for track in clip.tracks])
-    estimated = frame_rate.estimate_frame_rate(clip.key_times)
     return partial(
         ClipReport,
         start_s=start,
@@ -137,6 +139,10 @@ def _clip(
         root_speed_m_per_s=way.speed,
         track_list=tuple(_track(track, skeleton, counted, i) for i, track in enumerate(clip.tracks if tracks else ())),
     )
+
+
+def _frame_rate(axes: tuple[TimeAxis, ...]) -> frame_rate.FrameRate | None:
+    return frame_rate.estimate_frame_rate(merge_times(axes))
 
 
 def _with_end(clip: Clip, counted: TrackStats) -> TrackStats:
