@@ -88,7 +88,7 @@ PUBLIC = {
     "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
     "measure.compare": "diff equal_scenes name_matching vertex_distance",
     "measure.continuity": "continuity knots",
-    "measure.continuous_bound": "clip_groups largest_error prover",
+    "measure.continuous_bound": "clip_groups largest_error prover sampled_clips",
     "measure.error": "error_curve metric point_matrix sample_times shell_points statistics surface",
     "measure.inspect": ("contents frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"),
     "measure.loops": "clip_ends end_frames joint_gaps loop_analysis recommendations skin_motion",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric, MotionError
@@ -20,7 +20,7 @@ from anim.optimization.search.plan import Solution
 from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
-from anim.optimization.verification import Verification, verify
+from anim.optimization.verification import Verification, verify_clips
 
 RETRY_FACTOR = 0.97  # applied to bound / measured error for the next search
 NEW_VERTEX_RETRY_FACTOR = 0.995  # the same if the worst vertex was not among the measured points
@@ -29,8 +29,16 @@ MAX_ROUNDS = 6  # of search and verification; a clip that fails the last one is 
 UNVERIFIED = Verification(MotionError(0.0, 0.0, "", "", 0), "", None, 0.0)
 
 
+class VerificationRequest(NamedTuple):
+    """A new version of a clip to verify against its source. number: index of the clip in the file."""
+
+    number: int
+    after: Clip
+
+
 Result = TypeVar("Result")
-Optimizing: TypeAlias = Generator[tuple[Effort, SearchRequest], "SearchResult | None", Result]
+Asked: TypeAlias = tuple[Effort, SearchRequest] | VerificationRequest
+Optimizing: TypeAlias = Generator[Asked, Any, Result]  # is sent the result of each
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +83,13 @@ class ClipOptimizer:
             return self._default_context
         return self._context(extra)
 
-    def verify(self, number: int, after: Clip) -> Verification:
-        """Return the error of a new version of clip `number` against its source."""
+    def verify(self, asked: Sequence[VerificationRequest]) -> list[Verification]:
+        """Return the errors of new versions of clips against their sources."""
         if not self.verified:
-            return UNVERIFIED
-        return verify(
+            return [UNVERIFIED] * len(asked)
+        return verify_clips(
             self._ruler,
-            self.clips[number],
-            after,
+            [(self.clips[each.number], each.after) for each in asked],
             bounds=self.request.bounds,
             reference=self.request.policy.reference,
             players=self.request.players,
@@ -136,15 +143,24 @@ def optimize_clips(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) 
     """
     steps = [_optimize(optimizer, number, task) for number, task in items]
     found: dict[int, ClipResult] = {}
+    searches: dict[int, tuple[Effort, SearchRequest]] = {}
     answers: dict[int, Any] = dict.fromkeys(range(len(steps)))
     while answers:
-        asked: dict[int, tuple[Effort, SearchRequest]] = {}
+        versions: dict[int, VerificationRequest] = {}
         for n, answer in answers.items():
             try:
-                asked[n] = steps[n].send(answer)
+                asked = steps[n].send(answer)
             except StopIteration as end:
                 found[n] = end.value
-        answers = _search(optimizer, asked)
+                continue
+            if isinstance(asked, VerificationRequest):
+                versions[n] = asked
+            else:
+                searches[n] = asked
+        if versions:  # first, so that searches wait for those that follow from them
+            answers = dict(zip(versions, optimizer.verify(list(versions.values())), strict=True))
+        else:
+            answers, searches = _search(optimizer, searches), {}
     return [found[n] for n in range(len(steps))]
 
 
@@ -161,7 +177,7 @@ def _search(
 
 
 def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[ClipResult]:
-    """Optimize one clip: yields its searches, of which it takes the results."""
+    """Optimize one clip: yields its searches and verifications, of which it takes the results."""
     context = optimizer.context()
     found = []
     for effort in context.effort.all():
@@ -180,8 +196,9 @@ def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[C
     if best is not None and best.solution.size(context.coding) <= exact.size(context.coding):
         return best
     if best is None and not is_exact:
-        return ClipResult(exact, optimizer.verify(number, exact.clip), without_loss=True)
-    return _verify(optimizer, number, exact)
+        verdict = yield VerificationRequest(number, exact.clip)
+        return ClipResult(exact, verdict, without_loss=True)
+    return (yield from _verify(optimizer, number, exact))
 
 
 def _solve(context: Context, task: Task, effort: Effort) -> Optimizing[Solution | None]:
@@ -205,12 +222,12 @@ def _min_lossless_bytes(context: Context, task: Task) -> float:
     return min_lossless_bytes(task.clip.tracks, stays, context.coding.byte_costs)
 
 
-def _verify(optimizer: ClipOptimizer, number: int, solution: Solution) -> ClipResult:
+def _verify(optimizer: ClipOptimizer, number: int, solution: Solution) -> Optimizing[ClipResult]:
     """Verify a solution without its redundant keys; if that exceeds a bound, with them."""
     slim = drop_redundant_keys(solution, optimizer.after.skeleton, optimizer.request)
-    if slim is not None and (found := optimizer.verify(number, slim.clip)).holds:
+    if slim is not None and (found := (yield VerificationRequest(number, slim.clip))).holds:
         return ClipResult(slim, found)
-    return ClipResult(solution, optimizer.verify(number, solution.clip))
+    return ClipResult(solution, (yield VerificationRequest(number, solution.clip)))
 
 
 def _keys(clip: Clip) -> int:
@@ -228,7 +245,7 @@ def _search_within_bounds(
         solution = yield from _solve(optimizer.context(), task, effort)
         if solution is None:
             return None
-        result = _verify(optimizer, number, solution)
+        result = yield from _verify(optimizer, number, solution)
         found = result.verdict
         if found.holds:
             return result

@@ -14,7 +14,7 @@ from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimization import writing
 from anim.optimization.clip import Task
-from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
+from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, VerificationRequest, optimize_clips
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
@@ -105,7 +105,7 @@ def optimize(
     new = write_solutions(base.document if base else document, solutions, request.packing)
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):
-        verdicts[number] = optimizer.verify(number, read_back[number])
+        (verdicts[number],) = optimizer.verify([VerificationRequest(number, read_back[number])])
     done = writing.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 

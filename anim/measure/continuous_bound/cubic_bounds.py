@@ -11,19 +11,19 @@ from anim.measure.continuous_bound.quaternion_bounds import MIN_MIX_LENGTH, Quat
 def with_cubics(found: QuaternionBounds, value: Floats, cubic: Floats, is_cubic: Bools, h: Floats) -> QuaternionBounds:
     """Return the bounds with those of cubic tracks replaced.
 
-    value, cubic: (2, 4, P, G, U) the mixes at both ends, and (2, 2, 4, P, G, U) their first and second derivatives.
-    is_cubic: (U,). h: (G, 1) s.
+    value, cubic: (2, 4, P, L) the mixes at both ends, and (2, 2, 4, P, L) their first and second derivatives.
+    is_cubic: (L,). h: (L,) s.
     """
     own, most_own, own_rate = np.zeros_like(found.value), np.zeros_like(found.size), np.zeros_like(found.size)
     whole = found._replace(own=own, max_residual=most_own, residual_rate=own_rate)
-    part = on_cubics(value[..., is_cubic], cubic[0][..., is_cubic], cubic[1][..., is_cubic], h)
+    part = on_cubics(value[..., is_cubic], cubic[0][..., is_cubic], cubic[1][..., is_cubic], h[is_cubic])
     for name in QuaternionBounds._fields:
         getattr(whole, name)[..., is_cubic] = getattr(part, name)
     return whole
 
 
 def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> QuaternionBounds:
-    """Return the bounds of cubics with values, slopes and second derivatives (2, 4, P, G, U) at both ends."""
+    """Return the bounds of cubics with values, slopes and second derivatives (2, 4, P, L) at both ends."""
     of = arc_mix(value, slope)
     push = np.sqrt((bend * bend).sum(axis=1).max(axis=0))  # no |c″| is larger
     jerk = np.sqrt(((bend[1] - bend[0]) ** 2).sum(axis=0)) / h  # |c‴|, constant
@@ -44,7 +44,7 @@ def on_cubics(value: Floats, slope: Floats, bend: Floats, h: Floats) -> Quaterni
 
 
 def _min_norm(value: Floats, h: Floats) -> Floats:
-    """The smallest length on the chord (P, G, U)."""
+    """The smallest length on the chord (P, L)."""
     chord = (value[1] - value[0]) / h
     square, along, rate = ((x * y).sum(axis=0) for x, y in ((value[0],) * 2, (value[0], chord), (chord, chord)))
     return np.asarray(np.sqrt(nearest(square, along, rate, h)))

@@ -23,9 +23,9 @@ MIN_COEFFICIENT = 1e-3  # of sup|d″|, after solving; with a smaller one there 
 def difference_bounds(
     a: QuaternionBounds, b: QuaternionBounds, between: tuple[ChordBounds, ChordBounds, Bools], h: Floats
 ) -> Floats:
-    """Return bounds (3, P, G, U) of |d| and its first two derivatives, for b's quaternions minus a's.
+    """Return bounds (3, P, L) of |d| and its first two derivatives, for b's quaternions minus a's.
 
-    between: both as lines, and the mask (P, G, U) of lines normalized in both. h: (G, 1) s.
+    between: both as lines, and the mask (P, L) of lines normalized in both. h: (L,) s.
     """
     start, rate = (np.sqrt(_squares(x, y).max(axis=0)) for x, y in ((b.value, a.value), (b.slope, a.slope)))
     pull, drag = _between_lines(*between[:2], h)

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats
 from anim.maths import hierarchy
 from anim.measure.continuous_bound.derivative_bounds import product, resting
 from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
-from anim.measure.continuous_bound.intervals import Intervals
+from anim.measure.continuous_bound.node_tracks import (
+    ClipSpan,
+    NodeIntervals,
+    columns_of,
+    late_nodes,
+    moving_nodes,
+    pack,
+    pair_lengths,
+    static_nodes,
+    write_pairs,
+)
 from anim.measure.continuous_bound.rotation_bounds import rotation_bounds
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
-from anim.measure.continuous_bound.track_partition import ClipVersion, node_block, pick_tracks
 from anim.model import Skeleton
-from anim.sampling.batch import Batch
 
 UNIT_TOLERANCE = 1e-6  # of |q|²: up to this, players with and without normalization agree
 
@@ -32,23 +40,29 @@ class NodeBounds(NamedTuple):
     jumps: Floats
 
 
-def world_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
+def world_bounds(spans: Sequence[ClipSpan], *, players: Sequence[str]) -> NodeBounds:
     """Return the majorants of all nodes in world space, valid for each of the players.
 
-    Both versions have the same hierarchy. players: names in PLAYERS.
+    spans: of clips on the same two skeletons, with equal hierarchies; intervals of one follow those of another.
+    players: names in PLAYERS.
     """
-    local = local_bounds(first, second, where, players=players)
-    if hierarchy.is_deep(first.skeleton.levels()):
-        return _world_of_deep(local, first.skeleton)
+    local = local_bounds(spans, players=players)
+    skeleton = spans[0].versions[0].skeleton
+    found = (_world_of_deep if hierarchy.is_deep(skeleton.levels()) else _world_by_level)(local, skeleton)
+    found.jumps[..., ~local.jumps.any(axis=(0, 1))] = 0.0  # where nothing jumps, nan if another bound is unknown
+    return found
+
+
+def _world_by_level(local: NodeBounds, skeleton: Skeleton) -> NodeBounds:
     matrices, origins = np.empty_like(local.matrices), np.empty_like(local.origins)
     jumps = np.zeros((2, *local.jumps.shape[1:]))
     has_jumps = bool(local.jumps.any())
-    for depth, nodes in enumerate(first.skeleton.levels()):
+    for depth, nodes in enumerate(skeleton.levels()):
         own, origin, leap = local.matrices[:, :, nodes], local.origins[:, :, nodes], local.jumps[0, nodes]
         if depth == 0:
             matrices[:, :, nodes], origins[:, :, nodes], jumps[0, nodes] = own, origin, leap
             continue
-        above = first.skeleton.parents[nodes]
+        above = skeleton.parents[nodes]
         parent = matrices[:, :, above]
         matrices[:, :, nodes] = product(parent, own)
         origins[:, :, nodes] = origins[:, :, above] + product(parent, origin)
@@ -84,99 +98,71 @@ def _majorants(parts: Floats, at: int) -> Floats:
     return np.moveaxis(parts[:, at : at + 6].reshape(len(parts), 3, 2, -1), 0, 2)
 
 
-def local_bounds(first: ClipVersion, second: ClipVersion, where: Intervals, *, players: Sequence[str]) -> NodeBounds:
+def local_bounds(spans: Sequence[ClipSpan], *, players: Sequence[str]) -> NodeBounds:
     """Return the majorants of all nodes in local space. Parameters as for `world_bounds`."""
-    matrices, jumps = _rotations(first, second, where, players)
-    scales = _vectors(first, second, where, "scale", _max_norm)
+    first, second = (version.skeleton for version in spans[0].versions)
+    matrices, jumps = _rotations(spans, players)
+    scales = _vectors(spans, "scale", _max_norm)
     matrices, jumps = product(matrices, scales), jumps * scales[0, 1]
-    origins = _vectors(first, second, where, "translation", _length)
-    skewed = first.skeleton.sheared
+    origins = _vectors(spans, "translation", _length)
+    skewed = first.sheared
     if len(skewed):
-        a, b = first.skeleton.sheared_local, second.skeleton.sheared_local
+        a, b = first.sheared_local, second.sheared_local
         matrices[:, :, skewed] = resting(_norm(a[..., :3]), _norm((b - a)[..., :3]))[..., None]
         origins[:, :, skewed] = resting(_length(a[..., 3].T), _length((b - a)[..., 3].T))[..., None]
     return NodeBounds(matrices, origins, jumps[None])
 
 
-def _rotations(
-    first: ClipVersion, second: ClipVersion, where: Intervals, players: Sequence[str]
-) -> tuple[Floats, Floats]:
+def _rotations(spans: Sequence[ClipSpan], players: Sequence[str]) -> tuple[Floats, Floats]:
     """Majorants (3, 2, N, G) of all nodes' rotations, and jumps (N, G)."""
-    a, b = first.skeleton.rotation, second.skeleton.rotation
-    held, other = _held(first, "rotation"), _held(second, "rotation")
-    square = (held * held).sum(axis=1)
-    found = np.repeat(resting(square + np.abs(1 - square))[..., None], len(where), axis=-1)
+    a, b = (version.skeleton.rotation for version in spans[0].versions)
+    held, other = _constants(spans, "rotation")
+    square = (held * held).sum(axis=0)
+    found = _in_intervals(resting(square + np.abs(1 - square)), spans)
     jumps = np.zeros(found.shape[2:])
-    differs = (held != other).any(axis=1) | (np.abs(1 - square) > UNIT_TOLERANCE)
-    uneven = set(np.flatnonzero(differs).tolist()) | _late(first, where) | _late(second, where)
-    for nodes, tracks, gaps in _groups(first, second, "rotation", where, uneven):
-        place = {node: i for i, node in enumerate(nodes.tolist())}
-        some, leaps = rotation_bounds(
-            rotation_endpoints(a[nodes], tracks[0], place, gaps, players=players),
-            rotation_endpoints(b[nodes], tracks[1], place, gaps, players=players),
-            gaps.lengths,
+    differs = (held != other).any(axis=0) | (np.abs(1 - square) > UNIT_TOLERANCE)
+    static = map(static_nodes, spans, columns_of(spans), _uneven(spans, differs))
+    for some in pack((*_moving(spans, "rotation"), *static)):
+        one, another = (
+            rotation_endpoints([each.version(k, rest) for each in some], players=players)
+            for k, rest in enumerate((a, b))
         )
-        found[:, :, nodes], jumps[nodes] = np.swapaxes(some, -1, -2), leaps.T
+        bounds, leaps = rotation_bounds(one, another, pair_lengths(some))
+        write_pairs(bounds, some, found)
+        write_pairs(leaps, some, jumps)
     return found, jumps
 
 
-def _vectors(
-    first: ClipVersion, second: ClipVersion, where: Intervals, path: str, size: Callable[[Floats], Floats]
-) -> Floats:
+def _vectors(spans: Sequence[ClipSpan], path: str, size: Callable[[Floats], Floats]) -> Floats:
     """Majorants (3, 2, N, G) of all nodes' translations or scales."""
-    a, b = getattr(first.skeleton, path), getattr(second.skeleton, path)
-    held, other = _held(first, path), _held(second, path)
-    found = np.repeat(resting(size(held.T), size((other - held).T))[..., None], len(where), axis=-1)
-    for nodes, tracks, gaps in _groups(first, second, path, where):
-        place = {node: i for i, node in enumerate(nodes.tolist())}
-        both = endpoints(a[nodes], tracks[0], place, gaps), endpoints(b[nodes], tracks[1], place, gaps)
-        found[:, :, nodes] = np.swapaxes(slide_bounds(*both, gaps.lengths, size), -1, -2)
+    a, b = (getattr(version.skeleton, path) for version in spans[0].versions)
+    held, other = _constants(spans, path)
+    found = _in_intervals(resting(size(held), size(other - held)), spans)
+    for some in pack(_moving(spans, path)):
+        one, another = (endpoints([each.version(k, rest) for each in some]) for k, rest in enumerate((a, b)))
+        write_pairs(slide_bounds(one, another, pair_lengths(some), size), some, found)
     return found
 
 
-def _held(version: ClipVersion, path: str) -> Floats:
-    """Constant values (N, C) of static nodes: of their tracks, or of the rest pose."""
-    values: Floats = getattr(version.skeleton, path).copy()
-    for batch in _of_path(version.still, path):
-        values[[track.node for track in batch.tracks if track.node is not None]] = batch.values[0]
-    return values
+def _constants(spans: Sequence[ClipSpan], path: str) -> tuple[Floats, Floats]:
+    """Constant values (C, N, S) of static nodes in both versions of S clips: of their tracks, or of the rest pose."""
+    first, second = (np.stack([each.versions[k].constant_values(path) for each in spans], axis=-1) for k in (0, 1))
+    return np.swapaxes(first, 0, 1), np.swapaxes(second, 0, 1)
 
 
-def _late(version: ClipVersion, where: Intervals) -> set[int]:
-    """Nodes with a constant rotation after the first interval: some players normalize only from then on."""
-    late = [batch for batch in _of_path(version.still, "rotation") if batch.times[-1] > where.edges[1]]
-    return _nodes(late)
+def _in_intervals(found: Floats, spans: Sequence[ClipSpan]) -> Floats:
+    """Bounds of clips (..., S) for all of their intervals (..., G)."""
+    return np.repeat(found, [len(each.where) for each in spans], axis=-1)
 
 
-def _groups(
-    first: ClipVersion, second: ClipVersion, path: str, where: Intervals, uneven: Collection[int] = ()
-) -> Iterator[tuple[Ints, tuple[list[Batch], list[Batch]], Intervals]]:
-    """Nodes that move in either version, by blocks, with tracks and all intervals; then the others of `uneven`.
-
-    The latter with one interval, since all are equal.
-    """
-    moving = (_of_path(first.moving, path), _of_path(second.moving, path))
-    movers = _nodes(*moving)
-    for block in sorted({node_block(batch) for side in moving for batch in side}):
-        one, other = ([batch for batch in side if node_block(batch) == block] for side in moving)
-        yield np.array(sorted(_nodes(one, other)), np.int64), (one, other), where
-    if others := set(uneven) - movers:
-        still = [_of_nodes(_of_path(version.still, path), others) for version in (first, second)]
-        yield np.array(sorted(others), np.int64), (still[0], still[1]), where.first
+def _uneven(spans: Sequence[ClipSpan], differs: Bools) -> list[set[int]]:
+    """Nodes of each clip whose rotations differ between versions (N, S) or between players, even if constant."""
+    return [{*np.flatnonzero(some).tolist(), *late_nodes(each)} for each, some in zip(spans, differs.T, strict=True)]
 
 
-def _of_nodes(tracks: list[Batch], nodes: Collection[int]) -> list[Batch]:
-    """The tracks of some nodes."""
-    chosen = [(batch, np.array([track.node in nodes for track in batch.tracks])) for batch in tracks]
-    return [pick_tracks(batch, some) for batch, some in chosen if some.any()]
-
-
-def _of_path(tracks: list[Batch], path: str) -> list[Batch]:
-    return [batch for batch in tracks if batch.path == path]
-
-
-def _nodes(*tracks: list[Batch]) -> set[int]:
-    return {track.node for side in tracks for batch in side for track in batch.tracks if track.node is not None}
+def _moving(spans: Sequence[ClipSpan], path: str) -> Iterator[NodeIntervals]:
+    for each, columns in zip(spans, columns_of(spans), strict=True):
+        yield from moving_nodes(each, path, columns)
 
 
 def _length(vectors: Floats) -> Floats:

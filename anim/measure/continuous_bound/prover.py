@@ -6,13 +6,20 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import influence_radius
-from anim.measure.continuous_bound.interval_rise import IntervalRise, interval_rise, prepare_versions
+from anim.measure.continuous_bound.interval_rise import (
+    ClipTimes,
+    ClipVersions,
+    IntervalRise,
+    interval_rise,
+    prepare_versions,
+)
 from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
-from anim.measure.continuous_bound.refinement import OpenIntervals, RefinedMaximum, refine
+from anim.measure.continuous_bound.refinement import RefinedMaximum, refine
+from anim.measure.continuous_bound.sampled_clips import ClipPart, SampledClip, divide, end_limits
+from anim.measure.continuous_bound.subintervals import OpenIntervals, TimeIntervals, join_intervals
 from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
 from anim.model import Clip, Scene
 from anim.sampling.players import PLAYERS
@@ -38,13 +45,13 @@ class Proof(NamedTuple):
 
 
 class ProofTarget(NamedTuple):
-    """Target of a proof. found: m, largest distance so far. slack: m, largest excess of the bound over it."""
+    """Targets of proofs of clips. found: m, largest distance so far. slack: m, largest excess of the bound over it."""
 
-    found: float
-    slack: float
+    found: Floats
+    slack: Floats
 
     @property
-    def max_bound(self) -> float:
+    def max_bound(self) -> Floats:
         """The largest bound in m that needs no refinement."""
         return self.found + self.slack
 
@@ -78,34 +85,75 @@ class Prover:
         longest: float = MAX_UNSPLIT_S,
         slack: float = BOUND_SLACK,
     ) -> Proof:
-        """Return an upper bound of the displacement of any vertex at any time, in all of the players.
+        """Return the result of `certify` for one clip."""
+        clip = SampledClip(before, after, times, look)
+        return self.certify([clip], enough=enough, floor=floor, longest=longest, slack=slack)[0]
+
+    def certify(
+        self,
+        clips: Sequence[SampledClip],
+        *,
+        enough: float | None = None,
+        floor: float = 0.0,
+        longest: float = MAX_UNSPLIT_S,
+        slack: float = BOUND_SLACK,
+    ) -> list[Proof]:
+        """Return for each clip an upper bound of the displacement of any vertex at any time, in all of the players.
 
         It is above the largest sample by at most `slack`, as a fraction of it, unless intervals between times would
         need too many subdivisions, or the metric's skeletons have hundreds of levels.
-        times: (F,) s, increasing, with all keys of both clips and the last moment before each STEP key, such as those
-        of `dense_times`. look: samples at these times. enough: m, target of the bound if it is nearer to the
-        largest sample. floor: m, bounds below it are not refined. longest: s, as for `interval_rise`.
+        clips: all sampled in the same players. Short ones are bounded together; each has the result that it has alone.
+        enough: m, target of the bound if it is nearer to the largest sample. floor: m, bounds below it are not refined.
+        longest: s, as for `interval_rise`.
         Nothing is proven for scenes with different hierarchies, for players other than those of PLAYERS, or if
         quaternions pass through zero or rotate too far between two times.
         """
-        player, worst = look.player, look.error
-        if not self._knows_all or not set(look.limits) <= set(PLAYERS):
-            return Proof(None, worst, player)
-        bound = max(worst.max_error, floor)
-        room = max(bound * slack, NOISE * self.ruler.diagonal)
-        aim = ProofTarget(bound, min(room, enough - bound) if enough is not None and enough > bound else room)
-        seen, length = RefinedMaximum(), self._length(len(look.limits))
+        players = set(clips[0].look.limits) if clips else set()
+        if not self._knows_all or not players <= set(PLAYERS):
+            return [Proof(None, each.look.error, each.look.player) for each in clips]
+        bounds = np.array([max(each.look.error.max_error, floor) for each in clips])
+        room = np.maximum(bounds * slack, NOISE * self.ruler.diagonal)
+        if enough is not None:
+            room = np.where(enough > bounds, np.minimum(room, enough - bounds), room)
+        seen, aim = [RefinedMaximum() for _ in clips], ProofTarget(bounds.copy(), room)
+        versions: dict[int, ClipVersions] = {}
+        for step in divide(clips, self._length(len(players))) if self._parts else ():
+            numbers = [part.number for part in step]
+            versions = {n: versions.get(n) or self._versions(clips[n]) for n in numbers}
+            tops, found = self._bounds(clips, step, list(versions.values()), aim, longest)
+            bounds[numbers] = np.maximum(bounds[numbers], tops)
+            for n, other in zip(numbers, found, strict=True):
+                seen[n] = max(seen[n], other, key=lambda each: each.largest)
+        return [self._conclude(*each) for each in zip(clips, bounds.tolist(), seen, strict=True)]
+
+    def _versions(self, clip: SampledClip) -> ClipVersions:
         scenes = Scene(self.ruler.skeletons[0], ()), Scene(self.ruler.skeletons[1], ())
-        versions = prepare_versions(scenes, self.ruler.clips(before, after))
-        for start in range(0, len(times) - 1 if self._parts else 0, length):
-            stretch = slice(start, start + length + 1)
-            limits = _limits(look.limits, self._order, stretch)
-            risen = interval_rise(versions, times[stretch], self._reaches, list(limits), longest=longest)
-            closed, other = self._proven((before, after), times[stretch], limits, risen, aim)
-            bound = max(bound, closed)
-            seen = max(seen, other, key=lambda each: each.largest)
+        return prepare_versions(scenes, self.ruler.clips(clip.before, clip.after))
+
+    def _bounds(
+        self,
+        clips: Sequence[SampledClip],
+        step: Sequence[ClipPart],
+        versions: Sequence[ClipVersions],
+        aim: ProofTarget,
+        longest: float,
+    ) -> tuple[Floats, list[RefinedMaximum]]:
+        """The bounds of parts of clips (S,), and the result of refining each. aim: for all clips."""
+        times = [clips[part.number].times[part.frames] for part in step]
+        players = [player for player in PLAYER_ORDER if player in clips[0].look.limits]
+        limits = {player: end_limits(clips, step, self._order, player) for player in players}
+        risen = interval_rise(list(map(ClipTimes, versions, times)), self._reaches, players, longest=longest)
+        where, numbers = join_intervals(times), [part.number for part in step]
+        own = ProofTarget(*(each[numbers][where.clip] for each in aim))
+        pairs = [(clips[n].before, clips[n].after) for n in numbers]
+        tops, seen = self._proven(pairs, where, limits, risen, own)
+        return np.maximum.reduceat(tops, np.searchsorted(where.clip, np.arange(len(step)))), seen
+
+    def _conclude(self, clip: SampledClip, bound: float, seen: RefinedMaximum) -> Proof:
+        """The proof of a clip by its bound and the largest sample of the refinement."""
+        worst, player = clip.look.error, clip.look.player
         if seen.largest > worst.max_error:
-            found = self.ruler.error_at(before, after, np.array([seen.time]), player=seen.player)
+            found = self.ruler.error_at(clip.before, clip.after, np.array([seen.time]), player=seen.player)
             pointers, pointer = worst.max_pointer_error, worst.pointer
             player = seen.player
             worst = found._replace(times=worst.times + 1, max_pointer_error=pointers, pointer=pointer)
@@ -121,33 +169,37 @@ class Prover:
 
     def _proven(
         self,
-        clips: tuple[Clip, Clip],
-        times: Floats,
-        limits: Mapping[str, Floats],
+        clips: Sequence[tuple[Clip, Clip]],
+        where: TimeIntervals,
+        limits: Mapping[str, tuple[Floats, Floats]],
         risen: IntervalRise,
         aim: ProofTarget,
-    ) -> tuple[float, RefinedMaximum]:
-        """The bound of all intervals without refinement, and the result of refining the others."""
-        closed, opened = 0.0, []
-        for player, each in limits.items():
-            ends = each[:, :-1], each[:, 1:] + risen.jump
+    ) -> tuple[Floats, list[RefinedMaximum]]:
+        """The bounds (F,) of all intervals, and the result of refining those of each clip."""
+        closed, opened = np.zeros(len(where.clip)), []
+        for player, (start, end) in limits.items():
+            ends = start, end + risen.jump
             tops = np.maximum(*ends) + risen.rise
             is_open = (tops > aim.max_bound) & self.is_refined
-            closed = max(closed, float(np.where(is_open, 0.0, tops).max()))
+            closed = np.maximum(closed, np.where(is_open, 0.0, tops).max(axis=0))
             if is_open.any():
                 opened.append(OpenIntervals(player, ends, risen.rise, is_open))
-        refined, seen = self._refined(clips, times, opened, aim)
-        return max(closed, refined), seen
+        refined, seen = self._refined(clips, where, opened, aim)
+        return np.maximum(closed, refined), seen
 
     def _refined(
-        self, clips: tuple[Clip, Clip], times: Floats, opened: Sequence[OpenIntervals], aim: ProofTarget
-    ) -> tuple[float, RefinedMaximum]:
-        """The bound of open intervals of all players, and the largest displacement sampled in them.
+        self,
+        clips: Sequence[tuple[Clip, Clip]],
+        where: TimeIntervals,
+        opened: Sequence[OpenIntervals],
+        aim: ProofTarget,
+    ) -> tuple[Floats, list[RefinedMaximum]]:
+        """The bounds (F,) of open intervals of all players, and the largest displacement sampled in those of each clip.
 
         They are divided into as many parts as it takes if displacements within are not larger than at both ends; then,
         where they are, into as many as it takes in any case. All players have the same parts, to share what they can.
         """
-        bound, seen = 0.0, RefinedMaximum()
+        bound, seen = np.zeros(len(where.clip)), [RefinedMaximum() for _ in clips]
         for is_last in (False, True):
             opened = [each for each in opened if each.is_open.any()]
             if not opened:
@@ -155,20 +207,9 @@ class Prover:
             finest = np.maximum.reduce([each.num_parts(aim.slack) for each in opened])
             margins = [aim.slack if is_last else each.margin(aim.max_bound, aim.slack) for each in opened]
             parts = np.maximum.reduce([each.num_parts(margin) for each, margin in zip(opened, margins, strict=True)])
-            asked, edges = zip(*(each.subdivide(times, parts, aim.max_bound) for each in opened), strict=True)
+            asked, edges = zip(*(each.subdivide(where, parts, aim.max_bound) for each in opened), strict=True)
             found = refine(self.ruler, clips, asked, self._parts, target=aim.max_bound)
-            seen = max(seen, found, key=lambda each: each.largest)
+            seen = [max(pair, key=lambda each: each.largest) for pair in zip(seen, found, strict=True)]
             inner = [each.close(some, aim.max_bound, parts < finest) for each, some in zip(opened, asked, strict=True)]
-            bound = max(bound, *edges, *inner)
+            bound = np.maximum.reduce([bound, *edges, *inner])
         return bound, seen
-
-
-def _limits(
-    limits: Mapping[str, Sequence[NDArray[np.float32]]], order: Sequence[int], stretch: slice
-) -> dict[str, Floats]:
-    """Bounds of the displacement of groups at given times, by player in PLAYER_ORDER."""
-    return {
-        player: np.concatenate([limits[player][i][:, stretch] for i in order]).astype(np.float64)
-        for player in PLAYER_ORDER
-        if player in limits
-    }

@@ -17,12 +17,12 @@ MIN_MIX_LENGTH = 1e-3  # length of a mix; shorter ones have no reliable directio
 
 
 class QuaternionBounds(NamedTuple):
-    """Quaternions of P players, G intervals and U nodes; every value (P, G, U) unless noted.
+    """Quaternions of P players in L pairs of a node and an interval; every value (P, L) unless noted.
 
-    value, slope: (2, 4, P, G, U), q and q′ at both ends. size, speed: bounds of |q| and |q′|. lambda_: (2, P, G, U), λ
-    at both ends; max_lambda, lambda_rate: bounds of λ and |λ′|. rho, max_rho, rho_rate: the same of ρ. own: (2, 4, P,
-    G, U), max_residual, residual_rate: the same of e; None and 0 without e. excess: (3, P, G, U), bounds of |1 − |q|²|
-    and its first two derivatives.
+    value, slope: (2, 4, P, L), q and q′ at both ends. size, speed: bounds of |q| and |q′|. lambda_: (2, P, L), λ at
+    both ends; max_lambda, lambda_rate: bounds of λ and |λ′|. rho, max_rho, rho_rate: the same of ρ. own: (2, 4, P, L),
+    max_residual, residual_rate: the same of e; None and 0 without e. excess: (3, P, L), bounds of |1 − |q|²| and its
+    first two derivatives.
     """
 
     value: Floats
@@ -42,14 +42,14 @@ class QuaternionBounds(NamedTuple):
 
     @property
     def bend(self) -> Floats:
-        """Bound of |q″| (P, G, U)."""
+        """Bound of |q″| (P, L)."""
         return np.asarray(self.max_lambda * self.size + 2 * self.max_rho * self.speed + self.max_residual)
 
 
 class ArcMix(NamedTuple):
-    """Mixes c that are known at both ends of intervals. value, slope: (2, 4, P, G, U), c and c′.
+    """Mixes c that are known at both ends of intervals. value, slope: (2, 4, P, L), c and c′.
 
-    square, along, rate: (2, P, G, U), |c|², c·c′, |c′|².
+    square, along, rate: (2, P, L), |c|², c·c′, |c′|².
     """
 
     value: Floats
@@ -60,11 +60,11 @@ class ArcMix(NamedTuple):
 
     def part(self, players: slice) -> ArcMix:
         """Return the same of some players."""
-        return ArcMix(*(each[..., players, :, :] for each in self))
+        return ArcMix(*(each[..., players, :] for each in self))
 
 
 class ChordBounds(NamedTuple):
-    """A mix on a line, scaled to length 1 at an interval's start; (P, G, U), or (2, P, G, U) at both ends.
+    """A mix on a line, scaled to length 1 at an interval's start; (P, L), or (2, P, L) at both ends.
 
     square: |c|², along: c·c′, rate: |c′|². wedge: (|c|²|q′|)², which is constant. nearest, farthest: the smallest and
     the largest |c|².
@@ -79,16 +79,16 @@ class ChordBounds(NamedTuple):
 
     def part(self, players: slice) -> ChordBounds:
         """Return the same of some players."""
-        return ChordBounds(*(each[..., players, :, :] for each in self))
+        return ChordBounds(*(each[..., players, :] for each in self))
 
 
 def arc_mix(value: Floats, slope: Floats) -> ArcMix:
-    """Return a mix by its values and slopes (2, 4, P, G, U)."""
+    """Return a mix by its values and slopes (2, 4, P, L)."""
     return ArcMix(value, slope, *((x * y).sum(axis=1) for x, y in ((value, value), (value, slope), (slope, slope))))
 
 
 def chord_bounds(of: ArcMix, h: Floats) -> ChordBounds:
-    """Return a mix on a line, or the chord of another one. h: (G, 1) s."""
+    """Return a mix on a line, or the chord of another one. h: (L,) s."""
     first, along, rate = of.square[0], of.along[0], of.rate[0]
     least = nearest(first, along, rate, h)
     wedge = np.maximum(first * rate - along**2, 0.0)
@@ -99,7 +99,7 @@ def chord_bounds(of: ArcMix, h: Floats) -> ChordBounds:
 def slerp_bounds(of: ArcMix, turn: Floats, h: Floats) -> QuaternionBounds:
     """Return the bounds of arcs and lines without normalization: q = c.
 
-    turn: (P, G, U) rad, ν times the interval's length.
+    turn: (P, L) rad, ν times the interval's length.
     """
     reach = 1 - turn * turn / 8  # |c| is at most the larger end divided by this, and so is |c′|, since c″ = −ν²c
     size, speed = (np.sqrt(each.max(axis=0)) / reach for each in (of.square, of.rate))
@@ -126,9 +126,9 @@ def nlerp_bounds(of: ArcMix, chord: ChordBounds) -> QuaternionBounds:
 
 
 def select_bounds(into: QuaternionBounds, part: QuaternionBounds, players: slice, where: Bools) -> None:
-    """Write the bounds of some players into those of all. where: (P', G, U), mask of the part's."""
+    """Write the bounds of some players into those of all. where: (P', L), mask of the part's."""
     for name in QuaternionBounds._fields[:11]:
-        np.copyto(getattr(into, name)[..., players, :, :], getattr(part, name), where=where)
+        np.copyto(getattr(into, name)[..., players, :], getattr(part, name), where=where)
 
 
 def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
@@ -139,7 +139,7 @@ def nearest(square: Floats, along: Floats, rate: Floats, h: Floats) -> Floats:
 
 
 def directed(of: ArcMix, drag: Floats) -> tuple[Floats, Floats]:
-    """Return the direction of a mix, and its derivative (2, 4, P, G, U). drag: (2, P, G, U)."""
+    """Return the direction of a mix, and its derivative (2, 4, P, L). drag: (2, P, L)."""
     over = 1 / np.sqrt(of.square)[:, None]
     value = of.value * over
     return value, of.slope * over - drag[:, None] * value

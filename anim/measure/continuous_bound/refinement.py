@@ -3,39 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Floats, Ints
+from anim.measure.continuous_bound.subintervals import Subintervals
 from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
 from anim.measure.error.metric import MAX_SEARCHED, ErrorMetric
 from anim.measure.error.point_groups import PointGroups
+from anim.measure.error.posed_clips import AskedTimes, has_weights
 from anim.model import Clip
-
-MAX_PARTS = 128  # maximum number of subintervals between two times
-
-
-class Subintervals(NamedTuple):
-    """Intervals between neighboring samples, divided into equal parts, for one player.
-
-    times: (T,) s, ends of parts; the last of an interval is the moment before its end. more: (C, T) m, upper
-    bound of the rise of the displacement of a group around each within a part; nan if that interval is not refined.
-    tops: (C, T) m, upper bound of the displacement around each, which `refine` sets. interval: (T,) index of each one's
-    interval.
-    """
-
-    player: str
-    times: Floats
-    more: Floats
-    tops: Floats
-    interval: Ints
-
-    def some(self, start: int, end: int) -> Subintervals:
-        """Return those with indices from `start` up to `end`, as views."""
-        here = slice(max(start, 0), max(end, 0))
-        return Subintervals(self.player, self.times[here], self.more[:, here], self.tops[:, here], self.interval[here])
 
 
 class RefinedMaximum(NamedTuple):
@@ -46,112 +24,64 @@ class RefinedMaximum(NamedTuple):
     time: float = 0.0
 
 
-@dataclass(slots=True)
-class OpenIntervals:
-    """Intervals between neighboring times whose bounds exceed a target, in one player.
-
-    ends: two times (C, F − 1) m, upper bounds of the displacements of C groups at the start and at the end of each
-    interval. rise: (C, F − 1) m, upper bounds of their rise above the larger one. is_open: (C, F − 1).
-    """
-
-    player: str
-    ends: tuple[Floats, Floats]
-    rise: Floats
-    is_open: Bools
-
-    def num_parts(self, margin: Floats | float) -> Ints:
-        """Return the number of parts (F − 1,) in which no displacement rises more than `margin` (C, F − 1) m."""
-        rises = np.where(self.is_open, self.rise / margin, 0.0).max(axis=0)
-        return np.asarray(np.clip(np.ceil(np.sqrt(rises)), 1, MAX_PARTS), np.int64)
-
-    def margin(self, target: float, least: float) -> Floats:
-        """Return how much displacements (C, F − 1) may rise above both ends until they reach the target, in m."""
-        return np.maximum(target - np.maximum(*self.ends), least)
-
-    def subdivide(self, times: Floats, parts: Ints, target: float) -> tuple[Subintervals, float]:
-        """Return the intervals between `times` (F,) s in `parts` (F − 1,), and the bound in m around unsampled ends.
-
-        An end is sampled only if the bound around it exceeds the target.
-        """
-        tops = np.stack(self.ends) + self.rise / parts**2
-        tops[:, ~self.is_open] = 0.0
-        sampled = np.any(tops > target, axis=1)
-        bound = float(np.where(sampled[:, None], 0.0, tops).max())
-        return subdivide(self.player, times, self.rise, self.is_open, parts, (sampled[0], sampled[1])), bound
-
-    def close(self, parts: Subintervals, target: float, refinable: Bools) -> float:
-        """Close intervals whose bound is below the target, and those that are not `refinable` (F − 1,).
-
-        Returns the largest bound of those that are closed, in m.
-        """
-        self.is_open = np.zeros_like(self.is_open)
-        if not len(parts.interval):
-            return 0.0
-        firsts = np.flatnonzero(np.diff(parts.interval, prepend=-1))
-        intervals = parts.interval[firsts]
-        tops = np.fmax.reduceat(parts.tops, firsts, axis=1)
-        still = (tops > target) & refinable[intervals]
-        self.is_open[:, intervals] = still
-        return float(np.fmax.reduce(np.where(still, 0.0, tops), axis=None))
-
-
-def subdivide(
-    player: str, times: Floats, rise: Floats, asked: Bools, parts: Ints, sampled: tuple[Bools, Bools] | None = None
-) -> Subintervals:
-    """Return the intervals between neighbors of `times` (F,) s, divided into `parts` (F − 1,).
-
-    rise: (C, F − 1) m of groups in whole intervals. asked: (C, F − 1), mask of the intervals to refine for each group.
-    sampled: (F − 1,) each, whether to sample the starts and the ends of intervals; by default all.
-    """
-    stretches = np.flatnonzero(asked.any(axis=0))
-    counts = parts[stretches] + 1
-    whole, stretch = np.repeat(parts[stretches], counts), np.repeat(stretches, counts)
-    step = np.arange(len(whole)) - np.repeat(np.cumsum(counts) - counts, counts)
-    if sampled is not None:
-        kept = ((step > 0) | sampled[0][stretch]) & ((step < whole) | sampled[1][stretch])
-        whole, stretch, step = whole[kept], stretch[kept], step[kept]
-    start, end = times[stretch], times[stretch + 1]
-    at = np.where(step == whole, np.nextafter(end, start), start + (end - start) * (step / whole))
-    more = np.where(asked, rise, np.nan)[:, stretch] / whole**2
-    return Subintervals(player, at, more, np.full_like(more, np.nan), stretch)
-
-
 def refine(
     ruler: ErrorMetric,
-    clips: tuple[Clip, Clip],
+    clips: Sequence[tuple[Clip, Clip]],
     asked: Sequence[Subintervals],
     parts: Sequence[PointGroups],
     *,
-    target: float,
-) -> RefinedMaximum:
-    """Set `tops` of the subintervals, and return the largest displacement that was sampled.
+    target: Floats,
+) -> list[RefinedMaximum]:
+    """Set `tops` of the subintervals, and return the largest displacement that was sampled of each clip.
 
-    asked: of every player. parts: the surfaces of the groups, in order. target: m; vertices of groups with a smaller
-    bound are not evaluated.
+    clips: before and after. asked: of every player. parts: the surfaces of the groups, in order. target: (F,) m of each
+    interval; vertices of groups with a smaller bound are not evaluated.
     """
-    seen, left = RefinedMaximum(), MAX_SEARCHED
-    for chunk in _chunks(asked, ruler.length):
-        old, new = ruler.posed(*clips, [(each.player, each.times) for each in chunk])
-        more = np.concatenate([each.more for each in chunk], axis=1)
-        tops = np.full_like(more, np.nan)
-        first = 0
-        for part in parts:
-            here = slice(first, first + len(part.groups))
-            first += len(part.groups)
-            if np.isnan(more[here]).all():
-                continue
-            field = part.field(old, new)
-            if field is None:
-                continue
-            tops[here], largest, frame, looked = _searched(field, more[here], target, left)
-            left -= looked
-            if largest > seen.largest:
-                players = np.repeat([each.player for each in chunk], [len(each.times) for each in chunk])
-                seen = RefinedMaximum(largest, str(players[frame]), float(old.pose.times[frame]))
-        ends = np.cumsum([len(each.times) for each in chunk])
-        for each, end in zip(chunk, ends.tolist(), strict=True):
-            each.tops[:] = tops[:, end - len(each.times) : end]
+    seen = [RefinedMaximum() for _ in clips]
+    vertices = sum(len(group) for part in parts for group in part.groups)
+    alone = [has_weights(*pair) for pair in clips]
+    for group in _groups(asked, alone, min(ruler.length, MAX_SEARCHED // max(vertices, 1))):
+        left = MAX_SEARCHED  # groups of several clips have fewer, so that none takes from another
+        for chunk in _chunks(group, ruler.length):
+            old, new = ruler.posed(clips, [AskedTimes(each.player, each.times, each.clip) for each in chunk])
+            more = np.concatenate([each.more for each in chunk], axis=1)
+            limit = target[np.concatenate([each.interval for each in chunk])]
+            tops = np.full_like(more, np.nan)
+            first = 0
+            for part in parts:
+                here = slice(first, first + len(part.groups))
+                first += len(part.groups)
+                if np.isnan(more[here]).all():
+                    continue
+                field = part.field(old, new)
+                if field is None:
+                    continue
+                tops[here], found = _searched(field, more[here], limit, left)
+                left -= found.num_evaluated
+                _update(seen, found.longest, chunk)
+            ends = np.cumsum([len(each.times) for each in chunk])
+            for each, end in zip(chunk, ends.tolist(), strict=True):
+                each.tops[:] = tops[:, end - len(each.times) : end]
     return seen
+
+
+def _groups(asked: Sequence[Subintervals], alone: Sequence[bool], length: int) -> Iterator[list[Subintervals]]:
+    """Slices of all players' intervals, those of one clip, or of several with up to `length` times together.
+
+    alone: whether a clip is in no group of several: bounds of its morphed surfaces depend on the other times.
+    """
+    numbers = np.arange(len(alone) + 1)
+    firsts = np.array([np.searchsorted(each.clip, numbers) for each in asked])
+    counts = np.diff(firsts.sum(axis=0)).tolist()
+    starts = [0]
+    room = length - counts[0]
+    for n in range(1, len(counts)):
+        if counts[n] > room or alone[n] or alone[n - 1]:
+            starts.append(n)
+            room = length
+        room -= counts[n]
+    for start, end in zip(starts, [*starts[1:], len(counts)], strict=True):
+        yield [each.some(row[start], row[end]) for each, row in zip(asked, firsts.tolist(), strict=True)]
 
 
 def _chunks(asked: Sequence[Subintervals], length: int) -> Iterator[list[Subintervals]]:
@@ -162,10 +92,17 @@ def _chunks(asked: Sequence[Subintervals], length: int) -> Iterator[list[Subinte
         yield [each for each in some if len(each.times)]
 
 
-def _searched(field: DisplacementField, more: Floats, target: float, most: int) -> tuple[Floats, float, int, int]:
-    """Bounds of all groups (G, F), the longest vector, its frame, and the number (≤ `most`) of evaluated ones."""
+class _Evaluated(NamedTuple):
+    """The longest vectors (G, F) of groups, 0 where none were evaluated, and the number of those that were."""
+
+    longest: Floats
+    num_evaluated: int
+
+
+def _searched(field: DisplacementField, more: Floats, target: Floats, most: int) -> tuple[Floats, _Evaluated]:
+    """Bounds of all groups (G, F), and evaluated vectors, about `most` of them. target: (F,) m."""
     tops = field.limits + more
-    found, frame, looked = 0.0, 0, 0
+    found, looked = np.zeros(tops.shape), 0
     for group in np.flatnonzero((tops > target).any(axis=1)).tolist():
         frames = np.flatnonzero(tops[group] > target)
         vertices = len(field.vectors(group, frames[:1]))
@@ -173,9 +110,20 @@ def _searched(field: DisplacementField, more: Floats, target: float, most: int) 
         for some in (frames[i : i + size] for i in range(0, len(frames), size)):
             if looked > most:
                 break
-            longest = lengths(field, group, some).max(axis=0)
+            found[group, some] = lengths(field, group, some).max(axis=0)
             looked += vertices * len(some)
-            tops[group, some] = longest + more[group, some]
-            if longest.max() > found:
-                found, frame = float(longest.max()), int(some[longest.argmax()])
-    return tops, found, frame, looked
+            tops[group, some] = found[group, some] + more[group, some]
+    return tops, _Evaluated(found, looked)
+
+
+def _update(seen: list[RefinedMaximum], longest: Floats, chunk: Sequence[Subintervals]) -> None:
+    """Replace the maxima of clips by larger ones among displacements (G, F) of a chunk's times."""
+    clip: Ints = np.concatenate([each.clip for each in chunk])
+    times = np.concatenate([each.times for each in chunk])
+    players = np.repeat(np.arange(len(chunk)), [len(each.times) for each in chunk])
+    for n in sorted(set(clip.tolist())):
+        frames = np.flatnonzero(clip == n)
+        own = longest[:, frames]
+        frame = frames[own.argmax() % len(frames)]
+        if own.max() > seen[n].largest:
+            seen[n] = RefinedMaximum(float(own.max()), chunk[players[frame]].player, float(times[frame]))

@@ -20,15 +20,14 @@ from anim.measure.continuous_bound.quaternion_bounds import (
 from anim.measure.continuous_bound.rotation_endpoints import RotationEndpoints
 
 
-def rotation_bounds(first: RotationEndpoints, second: RotationEndpoints, lengths: Floats) -> tuple[Floats, Floats]:
-    """Return the majorant (3, 2, G, U) of matrices from quaternions, and bounds of their jumps (G, U).
+def rotation_bounds(first: RotationEndpoints, second: RotationEndpoints, h: Floats) -> tuple[Floats, Floats]:
+    """Return the majorant (3, 2, L) of matrices from quaternions, and bounds of their jumps (L,).
 
     Valid for each of the players. A matrix is q·x·q* + (1 − |q|²)·x of a vector x, for any quaternion q: a product
     of q with itself, and a remainder if q is not of unit length. If the quaternion is normalized in an interval but not
     after it, or the other way round, matrices jump at its end, both versions together by at most the second result.
-    lengths: of intervals (G,) in s.
+    h: (L,) s, lengths of intervals.
     """
-    h = lengths[:, None]
     second = _on_the_side_of(first, second)
     (a, line_a), (b, line_b) = _arc_bounds(first, h), _arc_bounds(second, h)
     lines = first.unit & second.unit & ~(first.is_cubic | second.is_cubic)
@@ -48,7 +47,7 @@ def _on_the_side_of(first: RotationEndpoints, second: RotationEndpoints) -> Rota
 
 
 def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:
-    """Mask (P, G, U) of equal motion in both versions."""
+    """Mask (P, L) of equal motion in both versions."""
     same: Bools = (first.value == second.value).all(axis=(0, 1)) & (first.turn == second.turn)
     same &= first.unit == second.unit
     if first.cubic is None and second.cubic is None:
@@ -59,12 +58,12 @@ def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:
 
 
 def _arc_bounds(of: RotationEndpoints, h: Floats) -> tuple[QuaternionBounds, ChordBounds]:
-    """Bounds of quaternions, and their mixes as lines. h: (G, 1) s."""
+    """Bounds of quaternions, and their mixes as lines. h: (L,) s."""
     start, end = of.value
     sine, cosine = 1 / (h * np.sinc(of.turn / np.pi)), np.cos(of.turn)
     mixed = arc_mix(of.value, np.stack(((end - cosine * start) * sine, (cosine * end - start) * sine)))
     found, chord = slerp_bounds(mixed, of.turn, h), chord_bounds(mixed, h)
-    players = np.flatnonzero((of.unit & ~of.is_cubic).any(axis=(1, 2)))
+    players = np.flatnonzero((of.unit & ~of.is_cubic).any(axis=1))
     if len(players):
         some = slice(int(players[0]), int(players[-1]) + 1)
         select_bounds(found, nlerp_bounds(mixed.part(some), chord.part(some)), some, of.unit[some])

@@ -1,31 +1,30 @@
 """Quaternions at both ends of every interval by player, and their arcs between.
 
 Within an interval a quaternion is a mix c of two keys, on a line (c″ = 0), on an arc (c″ = −ν²c) or on a cubic,
-unchanged or normalized.
+unchanged or normalized. L pairs of a node and an interval are those of `node_tracks`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.measure.continuous_bound.endpoints import of_batch
-from anim.measure.continuous_bound.intervals import Intervals
+from anim.measure.continuous_bound.node_tracks import NodeTracks, pairs_of
 from anim.model import Interpolation
-from anim.sampling.batch import Batch
 from anim.sampling.players import GLTF, PLAYERS, is_divided
 
 
 class RotationEndpoints(NamedTuple):
-    """Mixes of P players, in G intervals, of U nodes.
+    """Mixes of P players, in L pairs of a node and an interval.
 
-    value: (2, 4, P, G, U), at both ends. turn: (P, G, U) rad, ν times the interval's length; 0 on lines and cubics.
-    unit: (P, G, U) whether the mix is normalized. next_unit: the same after the interval; the opposite if unknown.
-    cubic: slope per s and bend per s² (2, 2, 4, 1, G, U) of cubics, 0 of others; None without cubics.
-    is_cubic: (U,).
+    value: (2, 4, P, L), at both ends. turn: (P, L) rad, ν times the interval's length; 0 on lines and cubics.
+    unit: (P, L) whether the mix is normalized. next_unit: the same after the interval; the opposite if unknown.
+    cubic: slope per s and bend per s² (2, 2, 4, 1, L) of cubics, 0 of others; None without cubics.
+    is_cubic: (L,).
     """
 
     value: Floats
@@ -37,30 +36,30 @@ class RotationEndpoints(NamedTuple):
 
 
 class _Keys(NamedTuple):
-    """Keys of tracks in G intervals and U nodes.
+    """Keys of tracks in L pairs of a node and an interval.
 
-    keys: (2, 4, G, U), the stored keys on both sides. shares: (2, G, U) interpolation parameters at both ends of
-    intervals. mixed: (G, U) whether LINEAR keys are interpolated there. tracked: (U,) whether there is a track. ended:
-    (U,), whether it has no key after the last interval. cubic, is_cubic: as in `RotationEndpoints`.
+    keys: (2, 4, L), the stored keys on both sides. shares: (2, L) interpolation parameters at both ends of intervals.
+    mixed: (L,) whether LINEAR keys are interpolated there. tracked: (L,) whether there is a track. last: (L,) whether
+    it is the node's last interval. ended: (L,), whether there is no key after that. cubic, is_cubic: as in
+    `RotationEndpoints`.
     """
 
     keys: Floats
     shares: Floats
     mixed: Bools
     tracked: Bools
+    last: Bools
     ended: Bools
-    cubic: Floats | None
+    cubic: Floats
     is_cubic: Bools
 
 
-def rotation_endpoints(
-    rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals, *, players: Sequence[str]
-) -> RotationEndpoints:
-    """Return the rotations of nodes, `rest` (U, 4) for those without a track.
+def rotation_endpoints(tracks: Sequence[NodeTracks], *, players: Sequence[str]) -> RotationEndpoints:
+    """Return the rotations of nodes in intervals, all pairs of one clip after those of another.
 
-    place: index of each node among them, by node index. players: names in PLAYERS.
+    players: names in PLAYERS.
     """
-    of = _keys(rest, tracks, place, where)
+    of = _keys(tracks)
     a, b = _stored_for(of, players)
     b *= np.where((a * b).sum(axis=0) < 0, -1.0, 1.0)
     theta, unit = np.zeros(a.shape[1:]), np.zeros(a.shape[1:], np.bool_)
@@ -69,41 +68,50 @@ def rotation_endpoints(
         theta[p] = np.where(of.mixed, angle, 0.0)
         unit[p] = np.where(of.mixed, divided, of.tracked & is_divided(player)) | of.is_cubic
     value = _blend(a, b, theta, of.shares)
-    if of.cubic is not None:
-        value[..., of.is_cubic] = of.keys[:, :, None, :, of.is_cubic]
-    last = np.where(of.ended, [[is_divided(player)] for player in players] & of.tracked, ~unit[:, -1]) | of.is_cubic
-    after = np.concatenate((unit[:, 1:], last[:, None]), axis=1)
-    return RotationEndpoints(value, theta * (of.shares[1] - of.shares[0]), unit, after, of.cubic, of.is_cubic)
+    has_cubics = bool(of.is_cubic.any())
+    if has_cubics:
+        value[..., of.is_cubic] = of.keys[:, :, None, of.is_cubic]
+    at_end = np.where(of.ended, [[is_divided(player)] for player in players] & of.tracked, ~unit) | of.is_cubic
+    after = np.where(of.last, at_end, np.roll(unit, -1, axis=1))
+    turn = theta * (of.shares[1] - of.shares[0])
+    return RotationEndpoints(value, turn, unit, after, of.cubic if has_cubics else None, of.is_cubic)
 
 
-def _keys(rest: Floats, tracks: Sequence[Batch], place: Mapping[int, int], where: Intervals) -> _Keys:
-    shape = (len(where), len(rest))
-    keys = np.broadcast_to(rest.T[:, None], (2, 4, *shape)).copy()
-    shares, mixed = np.zeros((2, *shape)), np.zeros(shape, np.bool_)
-    tracked, ended, is_cubic = (np.zeros(len(rest), np.bool_) for _ in range(3))
-    ended[:] = True
-    has_cubic = any(batch.interpolation is Interpolation.CUBICSPLINE for batch in tracks)
-    cubic = np.zeros((2, 2, 4, 1, *shape)) if has_cubic else None
-    for batch in tracks:
-        columns = [place[track.node] for track in batch.tracks if track.node is not None]
-        tracked[columns], ended[columns] = True, where.edges[-1] >= batch.times[-1]
-        if batch.tangents is not None and cubic is not None:
-            value, slope, bend = of_batch(batch, where)
-            keys[..., columns], is_cubic[columns] = value, True
-            cubic[..., columns] = np.stack((slope, bend))[:, :, :, None]
+def _keys(tracks: Sequence[NodeTracks]) -> _Keys:
+    num_pairs = sum(each.num_pairs for each in tracks)
+    is_cubic = any(batch.tangents is not None for each in tracks for batch in each.tracks)
+    cubic = np.zeros((2, 2, 4, 1, num_pairs if is_cubic else 0))
+    mixed, tracked, last, ended, cubics = np.zeros((5, num_pairs), np.bool_)
+    found = _Keys(np.empty((2, 4, num_pairs)), np.zeros((2, num_pairs)), mixed, tracked, last, ended, cubic, cubics)
+    for each, pairs in pairs_of(tracks):
+        parts: list[Any] = [each.view(whole[..., pairs]) if whole.size else whole for whole in found]
+        _write_keys(each, _Keys(*parts))
+    return found
+
+
+def _write_keys(of: NodeTracks, into: _Keys) -> None:
+    """Write the keys of one clip's nodes into views (..., U, G) of those of all pairs."""
+    into.keys[...] = of.rest.T[:, :, None]
+    into.last[:, -1:], into.ended[...] = True, True
+    for batch in of.tracks:
+        rows = of.rows(batch)
+        into.tracked[rows], into.ended[rows] = True, of.where.edges[-1] >= batch.times[-1]
+        if batch.tangents is not None:
+            value, slope, bend = of_batch(batch, of.where)
+            into.keys[..., rows, :], into.is_cubic[rows] = value, True
+            into.cubic[..., rows, :] = np.stack((slope, bend))[:, :, :, None]
             continue
-        at = where.on(batch.time_axis)
-        keys[0][..., columns] = np.moveaxis(batch.values[at.left], -1, 0)
+        at = of.where.on(batch.time_axis)
+        into.keys[0][:, rows] = batch.values[at.left].T
         is_linear = batch.interpolation is Interpolation.LINEAR
-        keys[1][..., columns] = np.moveaxis(batch.values[at.right], -1, 0) if is_linear else keys[0][..., columns]
+        into.keys[1][:, rows] = batch.values[at.right].T if is_linear else into.keys[0][:, rows]
         if is_linear:
-            shares[..., columns] = np.stack((at.start, at.end))[..., None]
-            mixed[:, columns] = at.inside[:, None]
-    return _Keys(keys, shares, mixed, tracked, ended, cubic, is_cubic)
+            into.shares[:, rows] = np.stack((at.start, at.end))[:, None]
+            into.mixed[rows] = at.inside
 
 
 def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
-    """The keys on both sides (4, P, G, U) as each player uses them before interpolation."""
+    """The keys on both sides (4, P, L) as each player uses them before interpolation."""
     directed = of.keys
     if GLTF in players:
         length = np.sqrt((of.keys * of.keys).sum(axis=1))
@@ -113,7 +121,7 @@ def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
 
 
 def _blend(a: Floats, b: Floats, angle: Floats, shares: Floats) -> Floats:
-    """Mixes (2, 4, P, G, U) of quaternions (4, P, G, U) with `angle` (P, G, U), at parameters (2, G, U)."""
+    """Mixes (2, 4, P, L) of quaternions (4, P, L) with `angle` (P, L), at parameters (2, L)."""
     angle = angle / np.pi
     whole = np.sinc(angle)
     result = np.empty((2, *a.shape))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,8 @@ from anim.arrays import Floats
 from anim.measure.continuous_bound.derivative_bounds import product, resting
 from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
 from anim.measure.continuous_bound.influence_radius import InfluenceRadius, Morphing
-from anim.measure.continuous_bound.intervals import Intervals
 from anim.measure.continuous_bound.node_bounds import NodeBounds
-from anim.measure.continuous_bound.track_partition import ClipVersion
+from anim.measure.continuous_bound.node_tracks import ClipSpan, NodeTracks
 
 
 class SecondDerivativeBound(NamedTuple):
@@ -25,13 +25,11 @@ class SecondDerivativeBound(NamedTuple):
     jump: Floats
 
 
-def second_derivative_bound(
-    of: InfluenceRadius, nodes: NodeBounds, first: ClipVersion, second: ClipVersion, where: Intervals
-) -> SecondDerivativeBound:
+def second_derivative_bound(of: InfluenceRadius, nodes: NodeBounds, spans: Sequence[ClipSpan]) -> SecondDerivativeBound:
     """Return bounds of the second derivative and jumps of displacements. nodes: in the world."""
     points = resting(of.arms, of.apart)[..., None]
     if of.morphing is not None:
-        points = points + _morphed(of.morphing, first, second, where)
+        points = points + _morphed(of.morphing, spans)
     moved = nodes.origins[:, :, of.nodes] + product(nodes.matrices[:, :, of.nodes], points)
     jump = nodes.jumps[1, of.nodes] + nodes.jumps[0, of.nodes] * points[0, 1]
     return SecondDerivativeBound(
@@ -39,14 +37,19 @@ def second_derivative_bound(
     )
 
 
-def _morphed(of: Morphing, first: ClipVersion, second: ClipVersion, where: Intervals) -> Floats:
+def _morphed(of: Morphing, spans: Sequence[ClipSpan]) -> Floats:
     """Majorants (3, 2, J, G) of the displacement of points by weights in the spaces of joints."""
-    first_ends, second_ends = (
-        endpoints(rest[None], side.weights(owner, len(rest)), {owner: 0}, where)
-        for side, owner, rest in zip((first, second), of.owners, of.rest, strict=True)
+    first, second = (
+        endpoints(
+            [
+                NodeTracks(np.array([owner]), rest[None], each.versions[k].weights(owner, len(rest)), each.where)
+                for each in spans
+            ]
+        )
+        for k, (owner, rest) in enumerate(zip(of.owners, of.rest, strict=True))
     )
-    weights = slide_bounds(first_ends, second_ends, where.lengths, np.abs)[..., 0]  # (3, 2, M, G)
-    return np.asarray(of.targets @ weights)
+    lengths = np.concatenate([each.where.lengths for each in spans])
+    return np.asarray(of.targets @ slide_bounds(first, second, lengths, np.abs))  # from weights (3, 2, M, G)
 
 
 def _by_group(bounds: Floats, of: InfluenceRadius) -> Floats:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Bools
+from anim.arrays import Bools, Floats, Ints
 from anim.model import Clip, Scene, Skeleton, TimeAxis
 from anim.sampling.batch import Batch, batches
 
@@ -25,10 +25,41 @@ class ClipVersion(NamedTuple):
     moving: list[Batch]
     still: list[Batch]
 
+    def nodes(self, path: str) -> set[int]:
+        """Return the nodes with moving tracks of a path."""
+        return {node for batch in self.moving if batch.path == path for node in nodes_of(batch)}
+
+    def moving_blocks(self, path: str) -> dict[int, list[Batch]]:
+        """Return the moving tracks of a path by block of nodes."""
+        found: dict[int, list[Batch]] = {}
+        for batch in self.moving:
+            if batch.path == path:
+                found.setdefault(nodes_of(batch)[0] // BLOCK_NODES, []).append(batch)
+        return found
+
+    def constant_values(self, path: str) -> Floats:
+        """Return the constant values (N, C) of static nodes: of their tracks, or of the rest pose."""
+        values: Floats = getattr(self.skeleton, path).copy()
+        for batch in self.still:
+            if batch.path == path:
+                values[nodes_of(batch)] = batch.values[0]
+        return values
+
+    def still_tracks(self, path: str, nodes: Ints) -> list[Batch]:
+        """Return the constant tracks of some nodes (U,)."""
+        wanted = set(nodes.tolist())
+        chosen = [(b, np.array([n in wanted for n in nodes_of(b)])) for b in self.still if b.path == path]
+        return [_pick_tracks(batch, some) for batch, some in chosen if some.any()]
+
     def weights(self, node: int, count: int) -> list[Batch]:
         """Return the track of a node's `count` morph weights, if it has one."""
         all_ = (track for batch in (*self.moving, *self.still) for track in batch.tracks if batch.path == "weights")
         return batches(track for track in all_ if track.node == node and track.values.shape[1] == count)
+
+
+def nodes_of(batch: Batch) -> list[int]:
+    """Return the nodes of a batch's tracks."""
+    return [track.node for track in batch.tracks if track.node is not None]
 
 
 def partition_tracks(scenes: tuple[Scene, Scene], clips: tuple[Clip, Clip]) -> tuple[ClipVersion, ClipVersion]:
@@ -44,14 +75,14 @@ def _stack(scene: Scene, clip: Clip) -> list[Batch]:
     return batches(track for track in clip.tracks if track.node is not None and track.node < count)
 
 
-def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | None, str]]) -> ClipVersion:
+def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int, str]]) -> ClipVersion:
     side = ClipVersion(skeleton, [], [])
     for batch in of:
-        moves = np.array([(track.node, track.path) in moving for track in batch.tracks])
+        moves = np.array([(node, batch.path) in moving for node in nodes_of(batch)])
         if moves.any():
-            side.moving.extend(_by_block(pick_tracks(batch, moves)))
+            side.moving.extend(_by_block(_pick_tracks(batch, moves)))
         if not moves.all():
-            rest = pick_tracks(batch, ~moves)
+            rest = _pick_tracks(batch, ~moves)
             tangents = None if rest.tangents is None else (rest.tangents[0][:1], rest.tangents[1][:1])
             side.still.append(
                 replace(rest, time_axis=TimeAxis(rest.times[:1]), values=rest.values[:1], tangents=tangents)
@@ -59,15 +90,10 @@ def _sort_tracks(skeleton: Skeleton, of: list[Batch], moving: set[tuple[int | No
     return side
 
 
-def node_block(batch: Batch) -> int:
-    """Return the number of the block of nodes that all tracks of a moving batch belong to."""
-    return (batch.tracks[0].node or 0) // BLOCK_NODES
-
-
 def _by_block(batch: Batch) -> Iterable[Batch]:
     """The batch divided by blocks of nodes."""
-    blocks = np.array([track.node for track in batch.tracks]) // BLOCK_NODES
-    return (pick_tracks(batch, blocks == block) for block in sorted(set(blocks.tolist())))
+    blocks = np.array(nodes_of(batch)) // BLOCK_NODES
+    return (_pick_tracks(batch, blocks == block) for block in sorted(set(blocks.tolist())))
 
 
 def _is_constant(batch: Batch) -> Bools:
@@ -79,14 +105,14 @@ def _is_constant(batch: Batch) -> Bools:
     return np.asarray(same)
 
 
-def _keys(batch: Batch, chosen: Bools) -> Iterable[tuple[int | None, str]]:
-    return ((track.node, track.path) for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
+def _keys(batch: Batch, chosen: Bools) -> Iterable[tuple[int, str]]:
+    return ((node, batch.path) for node, is_one in zip(nodes_of(batch), chosen.tolist(), strict=True) if is_one)
 
 
-def pick_tracks(batch: Batch, chosen: Bools) -> Batch:
-    """Return the chosen (G,) of a batch's tracks as a batch."""
+def _pick_tracks(batch: Batch, chosen: Bools) -> Batch:
+    """The chosen (G,) of a batch's tracks as a batch."""
     if chosen.all():
         return batch
-    tracks = tuple(track for track, is_one in zip(batch.tracks, chosen, strict=True) if is_one)
+    tracks = tuple(track for track, is_one in zip(batch.tracks, chosen.tolist(), strict=True) if is_one)
     tangents = None if batch.tangents is None else (batch.tangents[0][:, chosen], batch.tangents[1][:, chosen])
     return Batch(tracks, batch.numbers[chosen], batch.time_axis, batch.values[:, chosen], tangents)

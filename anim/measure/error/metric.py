@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, Ints, unique_sorted
+from anim.arrays import Floats, Ints
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import max_displacement
@@ -21,11 +21,12 @@ from anim.measure.error.merged_groups import merge_points, merge_surfaces
 from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
+from anim.measure.error.posed_clips import AskedTimes, RecentSamplers, Samplers, pose_clips
 from anim.measure.error.reduced_skeleton import ReducedSkeleton, reduce_skeletons
 from anim.measure.error.sample_times import dense_times
 from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
 from anim.measure.error.surface import NUM_CORNERS, Surface, diagonal, has_vertices, node_cubes, surfaces
-from anim.model import Clip, Pose, Scene, Skeleton
+from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PosedSkeleton, PoseSampler
 from anim.sampling.weight_pointers import resolve_weight_pointers
@@ -124,7 +125,7 @@ class ErrorMetric:
                 self.num_static_points = points[..., 0].size - sum(len(g) for each in around for g in each.groups)
             self.parts += [*groups, *around]
         self.combined = combine_groups(self.parts)
-        self._last: tuple[Clip, Clip, tuple[PoseSampler, PoseSampler]] | None = None
+        self._recent = RecentSamplers()
 
     def _around_nodes(self, surfaces: Sequence[Surface], shell: float | None) -> tuple[Ints, Floats]:
         """The nodes (S,) that are measured at points (S, P, 3) around them, in their spaces.
@@ -258,40 +259,33 @@ class ErrorMetric:
         return max(BLOCK // max(matrices, 1), 8)
 
     def posed(
-        self, before: Clip, after: Clip, asked: Sequence[tuple[str, Floats]]
+        self, clips: Sequence[tuple[Clip, Clip]], asked: Sequence[AskedTimes]
     ) -> tuple[PosedSkeleton, PosedSkeleton]:
-        """Return both clips posed at some times (F,) in s by one player, at others by the next, concatenated.
+        """Return both versions of clips posed at some times by one player, at others by the next, concatenated.
 
-        asked: names in PLAYERS, each with its times; not more times than `length` in total.
+        asked: not more times than `length` in total.
         """
-        old, new = self._pose_samplers(before, after)
-        return _posed(self.skeletons[0], old, asked), _posed(self.skeletons[1], new, asked)
-
-    def _pose_samplers(self, before: Clip, after: Clip) -> tuple[PoseSampler, PoseSampler]:
-        """The samplers of both clips, those of the last call if the clips are the same: their keys are stacked."""
-        if self._last is not None and self._last[0] is before and self._last[1] is after:
-            return self._last[2]
-        old, new = starmap(PoseSampler, zip(self.skeletons, self.clips(before, after), strict=True))
-        self._last = before, after, (old, new)
+        numbers = sorted({n for each in asked for n in each.clip.tolist()})
+        samplers = {n: self._pose_samplers(*clips[n]) for n in numbers}
+        old, new = (
+            pose_clips(skeleton, {n: each[k] for n, each in samplers.items()}, asked)
+            for k, skeleton in enumerate(self.skeletons)
+        )
         return old, new
+
+    def _pose_samplers(self, before: Clip, after: Clip) -> Samplers:
+        """The samplers of both clips, those of an earlier call if the clips are the same: their keys are stacked."""
+        found = self._recent.find(before, after)
+        if found is None:
+            old, new = starmap(PoseSampler, zip(self.skeletons, self.clips(before, after), strict=True))
+            found = self._recent.add(before, after, (old, new))
+        return found
 
     def called(self, node: int) -> str:
         """Return the name of a node of `skeletons` for reports: its own, or "node 7"; "" for −1."""
         if self._reduced is not None:
             node = int(self._reduced.nodes[node])
         return self.scene.skeleton.display_name(node) if node >= 0 else ""
-
-
-def _posed(skeleton: Skeleton, poses: PoseSampler, asked: Sequence[tuple[str, Floats]]) -> PosedSkeleton:
-    """The clip at all of the times by every player, from which those asked for are taken: mostly nearly all."""
-    at = unique_sorted(np.concatenate([times for _, times in asked]))
-    found = poses.at_each(at, [sampler(player) for player, _ in asked])
-    frames = np.concatenate([i * len(at) + np.searchsorted(at, times) for i, (_, times) in enumerate(asked)])
-    if np.array_equal(frames, np.arange(len(found.times))):  # a proof may ask for a time twice
-        return PosedSkeleton(skeleton, found)
-    weights = {node: each[frames] for node, each in found.weights.items()}
-    parts = found.translation[frames], found.rotation[frames], found.scale[frames]
-    return PosedSkeleton(skeleton, Pose(found.times[frames], *parts, weights))
 
 
 def _round_up(values: Floats) -> NDArray[np.float32]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +14,18 @@ from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene, TimeAxis
 from anim.optimization.options import PLAYERS, Bounds, Reference
-from anim.optimization.verification import Verification, verify
+from anim.optimization.verification import Verification, verify_clips
 from anim.sampling import players
 from tests.clips import STEP, about, clip, skeleton, track
 
 RULER = ErrorMetric(Scene(skeleton([-1, 0], translation=[[0, 0, 0], [1, 0, 0]]), ()))  # cubes of 2 cm around both nodes
 TURN = clip(track("rotation", [0, 1], about("z", [0, 90])))
 SLIDE = clip(track("translation", [0, 0.5, 1], [[0, 0, 0], [0, 1, 0], [0, 0, 0]]))
+
+
+def _verify(before: Clip, after: Clip, **more: Any) -> Verification:
+    (found,) = verify_clips(RULER, [(before, after)], **more)
+    return found
 
 
 def _verdict(
@@ -29,7 +35,7 @@ def _verdict(
     reference: Reference = Reference.CURVE,
     asked: tuple[str, ...] = PLAYERS,
 ) -> Verification:
-    return verify(RULER, before, after, bounds=bounds, reference=reference, players=asked)
+    return _verify(before, after, bounds=bounds, reference=reference, players=asked)
 
 
 def _lifted(height: float) -> Clip:
@@ -99,7 +105,7 @@ def test_a_bound_for_every_time() -> None:
     many = np.linspace(0, 1, 65)
     fine = clip(track("rotation", many, about("z", 90 * many)))
     plain, proven = (
-        verify(RULER, TURN, fine, bounds=Bounds(1.0, 0.0), reference=Reference.CURVE, prover=prover)
+        _verify(TURN, fine, bounds=Bounds(1.0, 0.0), reference=Reference.CURVE, prover=prover)
         for prover in (None, Prover(RULER))
     )
     assert plain.certified is None
@@ -114,7 +120,7 @@ def test_a_proof_needs_few_samples() -> None:
     before = clip(track("rotation", times, about("z", 40 * np.sin(3 * times))))
     after = clip(track("rotation", times[::4], about("z", 40 * np.sin(3 * times[::4]))))
     plain, proven = (
-        verify(RULER, before, after, bounds=Bounds(0.05, 0.0), reference=Reference.CURVE, prover=prover)
+        _verify(before, after, bounds=Bounds(0.05, 0.0), reference=Reference.CURVE, prover=prover)
         for prover in (None, Prover(RULER))
     )
     assert proven.certified is not None
@@ -130,7 +136,7 @@ def test_a_loose_proof_of_few_samples_is_not_enough(monkeypatch: pytest.MonkeyPa
     before = clip(track("rotation", times, about("z", 40 * np.sin(3 * times))))
     after = clip(track("rotation", times[::4], about("z", 40 * np.sin(3 * times[::4]))))
     plain, proven = (
-        verify(RULER, before, after, bounds=Bounds(0.5, 0.0), reference=Reference.CURVE, prover=prover)
+        _verify(before, after, bounds=Bounds(0.5, 0.0), reference=Reference.CURVE, prover=prover)
         for prover in (None, Prover(RULER))
     )
     assert proven.certified is not None
@@ -141,7 +147,7 @@ def test_nothing_is_proven_where_the_bound_is_broken_or_only_keys_count() -> Non
     prover = Prover(RULER)
     for bound, reference in ((0.001, Reference.CURVE), (1.0, Reference.KEYS)):
         bounds = Bounds(bound, 0.0)
-        assert verify(RULER, SLIDE, _lifted(0.01), bounds=bounds, reference=reference, prover=prover).certified is None
+        assert _verify(SLIDE, _lifted(0.01), bounds=bounds, reference=reference, prover=prover).certified is None
 
 
 def test_what_a_proof_comes_across_counts() -> None:
@@ -151,19 +157,37 @@ def test_what_a_proof_comes_across_counts() -> None:
     before, after = (clip(track("rotation", times, keys * long)) for long in (1, np.array([[1], [1.001], [1]])))
     bounds = Bounds(0.0025, 0.0)
     plain, found = (
-        verify(RULER, before, after, bounds=bounds, reference=Reference.CURVE, players=("three",), prover=prover)
+        _verify(before, after, bounds=bounds, reference=Reference.CURVE, players=("three",), prover=prover)
         for prover in (None, Prover(RULER))
     )
     assert plain.error.max_error < found.error.max_error
     assert found.error.time == np.nextafter(1, 0)
     tight = replace(bounds, max_error=(plain.error.max_error + found.error.max_error) / 2)
     assert plain.error.max_error < tight.max_error
-    again = verify(
-        RULER, before, after, bounds=tight, reference=Reference.CURVE, players=("three",), prover=Prover(RULER)
-    )
+    again = _verify(before, after, bounds=tight, reference=Reference.CURVE, players=("three",), prover=Prover(RULER))
     assert not again.holds
 
 
 def test_every_player_that_is_known_is_asked() -> None:
     """three.js normalizes some joints and not others: on Fox, under a codec, 3 % beyond what the others show."""
     assert set(PLAYERS) == set(players.PLAYERS)
+
+
+@pytest.mark.parametrize("prover", [None, Prover(RULER)])
+@pytest.mark.parametrize("reference", list(Reference))
+def test_clips_together_have_the_errors_that_each_has_alone(prover: Prover | None, reference: Reference) -> None:
+    """Equal ones, near and far ones, a pointer, another end, and one that only dense samples prove."""
+    many = np.linspace(0, 1, 65)
+    pointer = clip(*SLIDE.tracks, track("/materials/0/pbrMetallicRoughness/metallicFactor", [0, 1], [[0], [1]]))
+    pairs = [
+        (SLIDE, SLIDE),
+        (SLIDE, _lifted(0.01)),
+        (TURN, clip(track("rotation", many, about("z", 90 * many)))),
+        (SLIDE, _lifted(5.0)),
+        (pointer, pointer),
+        (SLIDE, TURN),
+        (TURN, clip(track("rotation", [0, 2], about("z", [0, 90])))),
+    ]
+    more: dict[str, Any] = {"bounds": Bounds(0.05, 0.0), "reference": reference, "prover": prover}
+    assert verify_clips(RULER, pairs, **more) == [_verify(*pair, **more) for pair in pairs]
+    assert verify_clips(RULER, [], **more) == []

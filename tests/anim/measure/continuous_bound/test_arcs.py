@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.continuous_bound.intervals import merge_intervals
+from anim.measure.continuous_bound.intervals import Intervals, merge_intervals
+from anim.measure.continuous_bound.node_tracks import NodeTracks
 from anim.measure.continuous_bound.prover import PLAYER_ORDER
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
 from anim.measure.error.sample_times import dense_times
-from anim.model import Interpolation, Track
+from anim.model import Clip, Interpolation, Track
 from anim.sampling.batch import batches
 from anim.sampling.players import PLAYERS, sampler_for
 from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, skeleton, track
@@ -41,15 +42,15 @@ def test_laws_play_as_players_do(mode: Interpolation, seed: int) -> None:
     times = np.unique(np.concatenate((dense_times(moving), [0.0, 1.2])))
     where = merge_intervals(times, moving)
     players = list(PLAYER_ORDER)
-    found = rotation_endpoints(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
-    length = np.linalg.norm(found.value, axis=1)  # (2, P, G, U)
+    found = rotation_endpoints([_tracks(moving, where)], players=players)
+    length = np.linalg.norm(found.value, axis=1)  # (2, P, L)
     shown = found.value / np.where(found.unit, length, 1.0)[:, None]
     for p, player in enumerate(players):
         poses = sampler_for(skeleton([-1]), moving, player=player)
         for end, at in enumerate((where.starts, np.nextafter(where.ends, 0))):
             expected = poses.at(at).rotation[:, 0]
-            assert np.abs(_same_side(shown[end, :, p, :, 0].T, expected) - expected).max() < 1e-9
-        after = np.where(found.next_unit[p, :, 0], 1.0, length[1, p, :, 0])
+            assert np.abs(_same_side(shown[end, :, p].T, expected) - expected).max() < 1e-9
+        after = np.where(found.next_unit[p], 1.0, length[1, p])
         at_key = np.linalg.norm(poses.at(where.ends).rotation[:, 0], axis=1)
         if mode is LINEAR:  # a step is elsewhere
             assert np.abs(after - at_key).max() < 1e-9
@@ -61,12 +62,16 @@ def test_within_gaps_the_law_goes_on(seed: int) -> None:
     moving = clip(_rotations(LINEAR, seed))
     where = merge_intervals(dense_times(moving), moving)
     players = list(PLAYER_ORDER)
-    found = rotation_endpoints(np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), {0: 0}, where, players=players)
+    found = rotation_endpoints([_tracks(moving, where)], players=players)
     middle = (found.value[0] + found.value[1]) / (2 * np.cos(found.turn / 2))
     middle /= np.where(found.unit, np.linalg.norm(middle, axis=0), 1.0)
     for p, player in enumerate(players):
         expected = sampler_for(skeleton([-1]), moving, player=player).at((where.starts + where.ends) / 2).rotation[:, 0]
-        assert np.abs(_same_side(middle[:, p, :, 0].T, expected) - expected).max() < 1e-9
+        assert np.abs(_same_side(middle[:, p].T, expected) - expected).max() < 1e-9
+
+
+def _tracks(moving: Clip, where: Intervals) -> NodeTracks:
+    return NodeTracks(np.zeros(1, int), np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), where)
 
 
 def _same_side(found: Floats, expected: Floats) -> Floats:

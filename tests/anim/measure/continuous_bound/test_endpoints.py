@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
 from anim.measure.continuous_bound.intervals import Intervals
+from anim.measure.continuous_bound.node_tracks import NodeTracks
 from anim.model import Interpolation, Track
 from anim.sampling.batch import batches
 from anim.sampling.track import sample
@@ -26,20 +29,22 @@ def _length(vectors: Floats) -> Floats:
 def test_one_sided_values_and_slopes(mode: Interpolation) -> None:
     """Against the track itself, a little inside both ends of each gap."""
     moving = _track(mode)
-    found = endpoints(np.zeros((2, 3)), batches([moving]), {0: 1}, WHERE)
-    assert not found.value[..., 0].any()
+    of = NodeTracks(np.array([7, 8]), np.zeros((2, 3)), batches([replace(moving, node=8)]), WHERE)
+    found = endpoints([of])
+    nothing, value, slope, bend = found.value[..., :4], *(each[..., 4:] for each in found)
+    assert not nothing.any()
     for side, at, inward in ((0, WHERE.starts, 1e-5), (1, WHERE.ends, -1e-5)):
         near = [sample(moving, at + k * inward).T for k in (1, 2, 3)]
-        assert found.value[side, ..., 1] == pytest.approx(near[0], abs=1e-4)
-        assert found.slope[side, ..., 1] == pytest.approx((near[1] - near[0]) / inward, abs=2e-3)
-        assert found.bend[side, ..., 1] == pytest.approx((near[2] - 2 * near[1] + near[0]) / inward**2, abs=1e-2)
+        assert value[side] == pytest.approx(near[0], abs=1e-4)
+        assert slope[side] == pytest.approx((near[1] - near[0]) / inward, abs=2e-3)
+        assert bend[side] == pytest.approx((near[2] - 2 * near[1] + near[0]) / inward**2, abs=1e-2)
 
 
 @pytest.mark.parametrize("modes", [(LINEAR, LINEAR), (CUBICSPLINE, LINEAR), (CUBICSPLINE, CUBICSPLINE)])
 def test_bounds_of_slides(modes: tuple[Interpolation, Interpolation]) -> None:
     a, b = _track(modes[0]), _track(modes[1], 0.1)
-    both = [endpoints(np.zeros((1, 3)), batches([each]), {0: 0}, WHERE) for each in (a, b)]
-    found = slide_bounds(both[0], both[1], WHERE.lengths, _length)[..., 0]
+    both = [endpoints([NodeTracks(np.zeros(1, int), np.zeros((1, 3)), batches([each]), WHERE)]) for each in (a, b)]
+    found = slide_bounds(both[0], both[1], WHERE.lengths, _length)
     for gap in range(len(WHERE)):
         t = np.linspace(WHERE.starts[gap], WHERE.ends[gap], 2001)[:-1]
         for row, motion in ((found[:, 0], sample(a, t)), (found[:, 1] - found[:, 0], sample(b, t) - sample(a, t))):

@@ -9,8 +9,9 @@ import pytest
 
 from anim.arrays import Floats
 from anim.measure.continuous_bound.influence_radius import influence_radius, join_reaches
-from anim.measure.continuous_bound.interval_rise import IntervalRise, interval_rise, prepare_versions
-from anim.measure.continuous_bound.refinement import OpenIntervals, refine, subdivide
+from anim.measure.continuous_bound.interval_rise import ClipTimes, IntervalRise, interval_rise, prepare_versions
+from anim.measure.continuous_bound.refinement import refine
+from anim.measure.continuous_bound.subintervals import OpenIntervals, join_intervals, subdivide
 from anim.measure.error.metric import ErrorMetric
 from anim.model import Clip, Scene
 from tests.anim.measure.continuous_bound.making import apart, pair
@@ -29,7 +30,7 @@ def _turning(degrees: float, end: float = 1.0) -> Clip:
 def _rises(of: Scene, before: Clip, after: Clip, times: Floats, player: str = "spec") -> IntervalRise:
     ruler = ErrorMetric(of)
     reaches = [each for each in map(influence_radius, ruler.parts) if each is not None]
-    return interval_rise(prepare_versions((of, of), (before, after)), times, reaches, [player])
+    return interval_rise([ClipTimes(prepare_versions((of, of), (before, after)), times)], reaches, [player])
 
 
 def test_a_turn_away_from_rest_rises_by_its_sagitta() -> None:
@@ -92,7 +93,7 @@ def test_cuts_by_hand() -> None:
     """Two parts of the first stretch for both groups, three of the last for the second one."""
     asked = np.array([[True, False, False], [True, False, True]])
     rise = np.array([[4.0, 1, 9], [8, 1, 18]])
-    found = subdivide("spec", np.array([0.0, 1, 2, 5]), rise, asked, np.array([2, 9, 3]))
+    found = subdivide("spec", join_intervals([np.array([0.0, 1, 2, 5])]), rise, asked, np.array([2, 9, 3]))
     assert found.times.tolist() == [0, 0.5, np.nextafter(1, 0), 2, 3, 4, np.nextafter(5, 2)]
     assert np.array_equal(found.more[0], [1, 1, 1, *[np.nan] * 4], equal_nan=True)
     assert found.more[1].tolist() == [2, 2, 2, 2, 2, 2, 2]
@@ -106,20 +107,21 @@ def test_ends_far_below_the_target_are_not_sampled_again() -> None:
     assert intervals.margin(7.0, 0.5).tolist() == [[1.0, 7.0]]
     assert intervals.num_parts(intervals.margin(7.0, 0.5)).tolist() == [3, 1]
     assert intervals.num_parts(0.5).tolist() == [4, 1]
-    found, bound = intervals.subdivide(np.array([0.0, 6, 7]), np.array([3, 1]), 7.0)
+    found, bound = intervals.subdivide(join_intervals([np.array([0.0, 6, 7])]), np.array([3, 1]), 7.0)
     assert found.times.tolist() == [2, 4]
-    assert bound == pytest.approx(6 + 8 / 9)
-    found, bound = intervals.subdivide(np.array([0.0, 6, 7]), np.array([2, 1]), 7.0)
+    assert bound == pytest.approx([6 + 8 / 9, 0])
+    found, bound = intervals.subdivide(join_intervals([np.array([0.0, 6, 7])]), np.array([2, 1]), 7.0)
     assert found.times.tolist() == [3, np.nextafter(6, 0)]
-    assert bound == pytest.approx(1 + 8 / 4)
+    assert bound == pytest.approx([1 + 8 / 4, 0])
 
 
 def test_intervals_above_the_target_stay_open_until_they_are_fine() -> None:
     ends, rise = (np.zeros((2, 3)), np.zeros((2, 3))), np.full((2, 3), 4.0)
     intervals = OpenIntervals("spec", ends, rise, np.array([[True, False, True], [True, False, False]]))
-    asked, _ = intervals.subdivide(np.array([0.0, 1, 2, 3]), np.array([2, 2, 2]), 0.5)
+    asked, _ = intervals.subdivide(join_intervals([np.array([0.0, 1, 2, 3])]), np.array([2, 2, 2]), 0.5)
     asked.tops[:] = asked.more + np.array([[0, 1, 0, 0, 0, 2], [0, 0, 0, 9, 9, 9]])  # 9 where no bound is asked for
-    assert intervals.close(asked, 1.5, np.array([True, True, False])) == 3.0
+    found = intervals.close(asked, np.full(3, 1.5), np.array([True, True, False]))
+    assert found.tolist() == [1.0, 0.0, 3.0]
     assert intervals.is_open.tolist() == [[True, False, False], [False, False, False]]
 
 
@@ -130,10 +132,12 @@ def test_a_second_look(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
     ruler = ErrorMetric(POINT)
     monkeypatch.setattr(ErrorMetric, "length", length)
     asked = [
-        subdivide(player, np.array([0.0, 2.0]), np.array([[0.4]]), np.array([[True]]), np.array([parts]))
+        subdivide(
+            player, join_intervals([np.array([0.0, 2.0])]), np.array([[0.4]]), np.array([[True]]), np.array([parts])
+        )
         for player, parts in (("nlerp", 1), ("spec", 2))
     ]
-    seen = refine(ruler, (HELD, away), asked, ruler.parts, target=0.05)
+    (seen,) = refine(ruler, [(HELD, away)], asked, ruler.parts, target=np.array([0.05]))
     assert (seen.player, seen.time) == ("spec", 1.0)
     assert seen.largest == pytest.approx(0.3)
     assert max(np.nanmax(each.tops) for each in asked) == pytest.approx(max(0.3 + 0.4 / 4, 0.4))

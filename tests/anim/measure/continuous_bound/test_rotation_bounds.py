@@ -11,6 +11,7 @@ from anim.arrays import Floats
 from anim.maths import hierarchy
 from anim.measure.continuous_bound.intervals import Intervals, merge_intervals
 from anim.measure.continuous_bound.node_bounds import local_bounds, world_bounds
+from anim.measure.continuous_bound.node_tracks import ClipSpan
 from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Scene
@@ -40,7 +41,7 @@ def test_no_derivative_exceeds_its_majorant(seed: int, player: str, share: float
     if len(where) < 1 or not {t for each in (before, after) for t in each.key_times} <= set(where.edges):
         return
     with np.errstate(all="ignore"):
-        found = world_bounds(*partition_tracks((of, of), (before, after)), where, players=[player])
+        found = world_bounds([ClipSpan(partition_tracks((of, of), (before, after)), where)], players=[player])
     a, b = (_derivatives(of, each, where, player, share) for each in (before, after))
     for bounds, part in ((found.matrices, np.s_[..., :3]), (found.origins, np.s_[..., 3:])):
         sizes = np.linalg.norm(a[part], 2, axis=(-1, -2)), np.linalg.norm((b - a)[part], 2, axis=(-1, -2))
@@ -57,7 +58,9 @@ def test_a_turn_at_constant_speed_is_bounded_exactly() -> None:
     of = Scene(skeleton([-1]), ())
     slow, fast = (clip(track("rotation", [0, 0.01], about("z", [0, degrees]))) for degrees in (1.0, 1.001))
     where = Intervals(np.array([0.0, 0.01]))
-    found = local_bounds(*partition_tracks((of, of), (slow, fast)), where, players=["spec"]).matrices[:, :, 0, 0]
+    found = local_bounds([ClipSpan(partition_tracks((of, of), (slow, fast)), where)], players=["spec"]).matrices[
+        :, :, 0, 0
+    ]
     first, second = np.radians([100, 100.1])
     assert found[:, 0] == pytest.approx([1, first, first**2], rel=1e-4)
     assert found[2, 1] - found[2, 0] == pytest.approx(second**2 - first**2, rel=0.02)
@@ -69,7 +72,7 @@ def test_a_jump_is_bounded_exactly() -> None:
     keys = about("z", [0, 60, 61]) * np.array([[1], [1.001], [1]])
     moving = clip(track("rotation", [0, 0.01, 0.02], keys))
     where = Intervals(np.array([0.0, 0.01, 0.02]))
-    jumps = world_bounds(*partition_tracks((of, of), (moving, moving)), where, players=["three"]).jumps
+    jumps = world_bounds([ClipSpan(partition_tracks((of, of), (moving, moving)), where)], players=["three"]).jumps
     poses = sampler_for(of.skeleton, moving, player="three").at(np.array([np.nextafter(0.01, 0), 0.01]))
     before, after = world_matrices(of.skeleton, poses)
     assert jumps[0, 0, 0] == pytest.approx(2 * 2 * (1.001**2 - 1))  # of both versions
@@ -87,10 +90,10 @@ def test_deep_trees_have_the_bounds_of_a_step_per_level(monkeypatch: pytest.Monk
     for length in (1.0, 1.0001):
         turns = [about("z", 0.1 * random.normal(size=3)) * [[1], [length], [1]] for _ in parents]
         versions.append(clip(*(track("rotation", times, keys, node=i) for i, keys in enumerate(turns))))
-    tracks = partition_tracks((of, of), (versions[0], versions[1]))
-    found = world_bounds(*tracks, Intervals(times), players=["three"])
+    span = ClipSpan(partition_tracks((of, of), (versions[0], versions[1])), Intervals(times))
+    found = world_bounds([span], players=["three"])
     monkeypatch.setattr(hierarchy, "MIN_DEPTH", 1000)
-    expected = world_bounds(*tracks, Intervals(times), players=["three"])
+    expected = world_bounds([span], players=["three"])
     assert expected.jumps.any()
     for name in ("matrices", "origins", "jumps"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-10)

@@ -10,6 +10,7 @@ import pytest
 from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.posed_clips import AskedTimes
 from anim.measure.error.sample_times import key_and_mid_times
 from anim.model import Scene
 from tests.anim.measure.error.brute_force import clip_of, points_on_a_node, with_track
@@ -136,6 +137,9 @@ def test_poses_at_a_time_that_is_asked_for_twice() -> None:
     scene = points_on_a_node([[1, 0, 0]])
     before = clip(track("rotation", [0, 1], about("z", [0, 60])))
     after = clip(track("rotation", [0, 1], about("z", [0, 90])))
-    asked = [("spec", np.array([0, 0.5, 1, 1])), ("nlerp", np.array([0, 1]))]
-    for pose in ErrorMetric(scene).posed(before, after, asked):
+    asked = [
+        AskedTimes("spec", np.array([0, 0.5, 1, 1]), np.zeros(4, int)),
+        AskedTimes("nlerp", np.array([0.0, 1]), np.zeros(2, int)),
+    ]
+    for pose in ErrorMetric(scene).posed([(before, after)], asked):
         np.testing.assert_array_equal(pose.times, [0, 0.5, 1, 1, 0, 1])
