@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -149,7 +150,17 @@ def _count_constant(found: list[_Value], track: Track, unit: float, bound: float
 
 def _difference(track: Track, value: Floats) -> float:
     """Largest distance of the track's keys from a value, in its units."""
-    return float(_farthest([track], value[None])[0])
+    squares = _squared_distances(track.values, value)
+    if track.path == "rotation":
+        squares = np.minimum(squares, _squared_distances(track.values, -value))
+    return math.sqrt(squares.max())
+
+
+def _squared_distances(values: Floats, value: Floats) -> Floats:
+    """Squared distances (K,) of keys (K, C) from a value (C,)."""
+    apart = values - value
+    apart *= apart
+    return np.asarray(apart.sum(axis=1))
 
 
 def _has_tangents(track: Track) -> bool:
