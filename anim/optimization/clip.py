@@ -88,6 +88,7 @@ class _TrackSorter:
         self._free: list[int] = []
         self._spent = 0.0
         self._single_axis: TimeAxis | None = None
+        self._off_unit = self._off_unit_tracks()
         for i, track in enumerate(task.clip.tracks):
             self._sort(i, track)
         self._reduce_weights()
@@ -117,7 +118,7 @@ class _TrackSorter:
             self._keep_track(i, key_reduction.reduce_pointer_keys(track, self._context.bounds.max_pointer_error))
         elif self._is_invisible(i):
             self._dropped.append(i)
-        elif track.node in policy.keep or exact or track.interpolation in self._kept or self._is_off_unit(track):
+        elif track.node in policy.keep or exact or track.interpolation in self._kept or i in self._off_unit:
             self._keep_exactly(i)
         elif self._task.at_rest and self._task.at_rest[i]:
             self._settle(i, track)
@@ -137,12 +138,20 @@ class _TrackSorter:
         stored = quantization.constant_cost(sign * rest)
         self._done[i] = _new_track(track, axis, stored), stored
 
-    def _is_off_unit(self, track: Track) -> bool:
-        """Return whether rotations are so far from unit length that players without normalization differ."""
-        if track.path != "rotation" or track.interpolation is Interpolation.CUBICSPLINE:
-            return False
-        error = np.abs(np.linalg.norm(track.values, axis=1) - 1).max()
-        return bool(2 * error * self._context.size > MAX_LENGTH_ERROR_FRACTION * self._task.bound)
+    def _off_unit_tracks(self) -> frozenset[int]:
+        """Tracks whose rotations are so far from unit length that players without normalization differ."""
+        rotations = [
+            (i, track.values)
+            for i, track in enumerate(self._clip.tracks)
+            if track.path == "rotation" and track.interpolation is not Interpolation.CUBICSPLINE
+        ]
+        if not rotations:
+            return frozenset()
+        numbers, values = zip(*rotations, strict=True)
+        firsts = np.cumsum([0, *map(len, values[:-1])])
+        error = np.maximum.reduceat(np.abs(np.linalg.norm(np.concatenate(values), axis=1) - 1), firsts)
+        is_off = 2 * error * self._context.size > MAX_LENGTH_ERROR_FRACTION * self._task.bound
+        return frozenset(np.array(numbers)[is_off].tolist())
 
     def _is_invisible(self, i: int) -> bool:
         node = self._clip.tracks[i].node
