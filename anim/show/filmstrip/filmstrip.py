@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.errors import RangeError
 from anim.show.filmstrip import captions, palette
+from anim.show.filmstrip.background import SceneView, mark_spacing, setup_view, translate_view
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, Camera, fit_camera
 from anim.show.filmstrip.captions import FAINT, LINE
-from anim.show.filmstrip.renderer import SceneView, mark_spacing, render_frame, setup_view, to_srgb, translate_view
+from anim.show.filmstrip.renderer import Image, render_frame
 from anim.show.filmstrip.root_path import RootPath
 from anim.show.filmstrip.surface import Surface
-from anim.show.filmstrip.surface_pattern import Checker, SurfaceMarks, edges
+from anim.show.filmstrip.surface_pattern import SurfaceMarks, checker, edges
 
 HEIGHT = 240  # pixels of a frame
 GAP, EDGE = 3, 12  # pixels between frames, and around all
@@ -30,8 +30,6 @@ TEXT_HEIGHT_PX = captions.LINE + 3  # pixels from the bottom of a frame to the t
 MAX_POINTS = 2_000_000  # for the framing of the camera
 LOOP_TOLERANCE = 1e-3  # of the displacement of vertices; the greatest loop gap of a closed loop
 MAX_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
-
-Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,14 +259,13 @@ def _frames(row: Strip, scenery: SceneView, most: float, look: ViewOptions) -> I
             position = row.root_path.at(row.times[f])
             vertices[:, [0, 2]] -= position
             view = translate_view(scenery, position, row.root_path.milestones(row.times[f], mark_spacing(scenery)))
-        picture = render_frame(view, vertices, row.faces, colors, marks, row.surface, tinted=row.distances is None)
-        yield to_srgb(picture)
+        yield render_frame(view, vertices, row.faces, colors, marks, row.surface, tinted=row.distances is None)
 
 
 def _marks(row: Strip, look: ViewOptions) -> list[SurfaceMarks]:
     found: list[SurfaceMarks] = []
     if look.checker:
-        found.append(Checker(row.positions[0] if row.rest is None else row.rest, row.faces).brightness)
+        found.append(checker(row.positions[0] if row.rest is None else row.rest, row.faces))
     if look.wire:
         found.append(edges)
     return found

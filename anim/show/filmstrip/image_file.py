@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anim.errors import RangeError
-from anim.show.filmstrip.filmstrip import Image
+from anim.show.filmstrip.renderer import Image
 
 COMPRESSION_LEVEL = 9
 WEBP_QUALITY = 88

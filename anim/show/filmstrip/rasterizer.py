@@ -21,8 +21,10 @@ MIN_AREA_PX2 = 1e-12  # pixels²; triangles of less area are seen edge-on
 AlphaTest: TypeAlias = Callable[[Ints, Ints, Ints], Bools]
 
 
-def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: AlphaTest | None = None) -> Ints:
-    """Return the index of the nearest triangle at each pixel (height, width), −1 for none.
+def visible_faces(
+    corners: Floats, *, width: int, height: int, top: int = 0, alpha_test: AlphaTest | None = None
+) -> Ints:
+    """Return the index of the nearest triangle at each pixel (height, width) of the rows from `top` on, −1 for none.
 
     corners: (T, 3, 3): x and y in pixels from the top left, and nearness, which grows toward the eye and is linear on
     the screen (1 / distance). A triangle covers the pixels with their center inside. Both sides are visible.
@@ -31,24 +33,35 @@ def visible_faces(corners: Floats, *, width: int, height: int, alpha_test: Alpha
     """
     seen: Ints = np.full(height * width, -1, np.int64)
     nearest = np.full(height * width, -np.inf)
-    faces = np.arange(len(corners))
-    if alpha_test is None and _area(corners) > MAX_OVERDRAW * height * width:
-        faces = _last_of_equal(corners)
+    faces = _faces_in_rows(corners, top, top + height)
+    if alpha_test is None and _area(corners, faces) > MAX_OVERDRAW * height * width:
+        faces = faces[_last_of_equal(corners[faces])]
     for start in range(0, len(faces), MAX_BATCH_FACES):
         drawn = faces[start : start + MAX_BATCH_FACES]
         shares, near, chosen = _planes(corners[drawn])
         y = corners[drawn[chosen], :, 1]
-        first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, height).astype(np.int64)
-        last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, height - 1).astype(np.int64)
+        first = np.clip(np.ceil(y.min(axis=1) - 0.5), top, top + height).astype(np.int64)
+        last = np.clip(np.floor(y.max(axis=1) - 0.5), top - 1, top + height - 1).astype(np.int64)
         rows = np.maximum(last - first + 1, 0)
         for some in _batches(rows, MAX_BATCH_ROWS):
             owner, line = _expand(first[some], rows[some])
-            _draw(owner + some.start, line, shares, near, drawn[chosen], seen, nearest, width, alpha_test)
+            _draw(owner + some.start, line, shares, near, drawn[chosen], seen, nearest, width, top, alpha_test)
     return seen.reshape(height, width)
 
 
-def _area(corners: Floats) -> float:
+def _faces_in_rows(corners: Floats, top: int, bottom: int) -> Ints:
+    """Indices, increasing, of triangles that reach into rows of pixels."""
+    a, b, c = (corners[:, i, 1] for i in range(3))
+    reaches_down = np.maximum(np.maximum(a, b), c) >= top
+    return np.flatnonzero(reaches_down & (np.minimum(np.minimum(a, b), c) <= bottom))
+
+
+def _area(corners: Floats, faces: Ints) -> float:
     """Sum of the areas of triangles, in pixels²."""
+    return sum(_area_of(corners[faces[i : i + MAX_BATCH_FACES]]) for i in range(0, len(faces), MAX_BATCH_FACES))
+
+
+def _area_of(corners: Floats) -> float:
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) / 2
 
@@ -109,9 +122,10 @@ def _draw(
     seen: Ints,
     nearest: Floats,
     width: int,
+    top: int,
     alpha_test: AlphaTest | None,
 ) -> None:
-    """Draw rows `line` of triangles `which`, each between its edges."""
+    """Draw rows `line` of triangles `which`, each between its edges. seen: of the rows from `top` on."""
     low, high = np.full(len(which), -np.inf), np.full(len(which), np.inf)
     middle = line + 0.5
     for i in range(3):
@@ -125,7 +139,8 @@ def _draw(
     last = np.clip(np.floor(high - 0.5 + EDGE_TOLERANCE_PX), -1, width - 1).astype(np.int64)
     counts = np.maximum(last - first + 1, 0)
     for some in _batches(counts, MAX_BATCH_PIXELS):
-        _draw_pixels(which[some], line[some], first[some], counts[some], near, chosen, seen, nearest, width, alpha_test)
+        these = which[some], line[some], first[some], counts[some]
+        _draw_pixels(*these, near, chosen, seen, nearest, width, top, alpha_test)
 
 
 def _draw_pixels(
@@ -138,6 +153,7 @@ def _draw_pixels(
     seen: Ints,
     nearest: Floats,
     width: int,
+    top: int,
     alpha_test: AlphaTest | None,
 ) -> None:
     """Draw `counts` pixels from column `first` on of rows `line` of triangles `which`."""
@@ -145,7 +161,7 @@ def _draw_pixels(
     plane = near[which]
     level = plane[:, 1] * (line + 0.5) + plane[:, 2] + plane[:, 0] * 0.5
     depth = level[row] + plane[row, 0] * x
-    pixel = (line * width)[row] + x
+    pixel = ((line - top) * width)[row] + x
     if alpha_test is not None:
         drawn = alpha_test(chosen[which[row]], x, line[row])
         row, pixel, depth = row[drawn], pixel[drawn], depth[drawn]

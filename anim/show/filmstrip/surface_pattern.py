@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,29 +18,23 @@ MIN_EDGE_DARKNESS = 0.12  # of the full darkness: edges of the smallest triangle
 SurfaceMarks = Callable[[Floats, Floats, Ints], Floats]
 
 
-@dataclass(frozen=True, slots=True)
-class Checker:
-    """Checker of cubes in the rest pose, dark and light alternately, deformed with the surface.
+def checker(rest: AnyArray, faces: Ints) -> SurfaceMarks:
+    """Return a checker of cubes in the rest pose, dark and light alternately, deformed with the surface.
 
     rest: (V, 3) m. faces: (T, 3). It needs no texture coordinates: lines straight at rest show the bending.
     """
+    used = rest[np.unique(faces)].astype(np.float64)
+    low, high = used.min(axis=0), used.max(axis=0)
+    cell = max(float(np.linalg.norm(high - low)) / CELLS, 1e-12)
 
-    rest: AnyArray
-    faces: Ints
-
-    def brightness(self, corners: Floats, samples: Floats, faces: Ints) -> Floats:
-        """Return the brightness (S,) at samples (S, 2) in pixels of faces (S,) with corners (S, 3, 3).
-
-        Barycentric weights are perspective-correct: those on the screen, weighted by nearness.
-        """
-        shares = barycentric(corners, samples) * corners[:, :, 2]
+    def brightness(corners: Floats, samples: Floats, chosen: Ints) -> Floats:
+        shares = barycentric(corners, samples) * corners[:, :, 2]  # on the screen → in space
         shares /= shares.sum(axis=1, keepdims=True)
-        used = self.rest[np.unique(self.faces)].astype(np.float64)
-        low, high = used.min(axis=0), used.max(axis=0)
-        cell = max(float(np.linalg.norm(high - low)) / CELLS, 1e-12)
-        places = np.einsum("si,sic->sc", shares, self.rest[self.faces[faces]].astype(np.float64))
+        places = np.einsum("si,sic->sc", shares, rest[faces[chosen]].astype(np.float64))
         odd = np.floor((places - (low + high) / 2) / cell).astype(np.int64).sum(axis=1) % 2 == 1
         return np.where(odd, DARK, LIGHT)
+
+    return brightness
 
 
 def edges(corners: Floats, samples: Floats, faces: Ints) -> Floats:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from dataclasses import replace
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from anim.errors import NotFoundError, RangeError
 from anim.exchange.stick_mesh import stick_mesh
 from anim.model import Scene
 from anim.model.vertex_cache import from_arrays
-from anim.show.filmstrip import clips, renderer
+from anim.show.filmstrip import background, clips, renderer
 from anim.show.filmstrip import filmstrip as filmstrip_module
 from anim.show.filmstrip.camera import fit_camera
 from anim.show.filmstrip.filmstrip import Extent, Strip, ViewOptions, animate_frames, filmstrip
@@ -79,8 +80,6 @@ def test_heat_of_one_method_is_the_distance_to_the_rest_pose() -> None:
 
 
 def test_a_skeleton_without_a_mesh_is_drawn_as_sticks() -> None:
-    from dataclasses import replace
-
     document = opened_fixture("biped")
     nodes = [{k: v for k, v in node.items() if k not in ("mesh", "skin")} for node in document.json["nodes"]]
     bare = replace(document, json={**document.json, "nodes": nodes})
@@ -177,20 +176,34 @@ def test_a_loop_shows_its_first_frame_once(back: bool, frames: int) -> None:
     )
 
 
-def test_pictures_are_drawn_in_bands_where_they_are_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    _, once = strip("biped", count=2)
-    monkeypatch.setattr(renderer, "MAX_BAND_SAMPLES", 5000)
-    _, bands = strip("biped", count=2)
-    assert np.abs(once.astype(int) - bands).max() <= 1
+@pytest.mark.parametrize("look", [SMALL, replace(SMALL, checker=True, wire=True)])
+@pytest.mark.parametrize("name", ["biped", "tube"])
+def test_pictures_are_the_same_in_bands(name: str, look: ViewOptions, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows, extent = clips.build_strips(clips.of_document(opened_fixture(name), [0], (), FrameSelection(count=2)))
+    once = filmstrip(rows, extent, look=look)
+    for samples in (1, 5000):
+        monkeypatch.setattr(renderer, "MAX_BAND_SAMPLES", samples)
+        assert np.array_equal(filmstrip(rows, extent, look=look), once)
 
 
-def test_the_background_is_the_same_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_grid_is_the_same_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
     points = np.array([[0, 0, 0], [1, 1, 1]], np.float64)
     camera = fit_camera(points, height=64)
-    whole = renderer.setup_view(camera, points, 0.0).background
+    whole = background.setup_view(camera, points, 0.0).grid
     for rows in (1, 7):
-        monkeypatch.setattr(renderer, "MAX_BAND_PIXELS", rows * camera.width)
-        assert np.array_equal(renderer.setup_view(camera, points, 0.0).background, whole)
+        monkeypatch.setattr(background, "MAX_BAND_PIXELS", rows * camera.width)
+        assert np.array_equal(background.setup_view(camera, points, 0.0).grid, whole)
+
+
+def test_marks_on_the_ground_are_the_same_in_bands() -> None:
+    points = np.array(list(product((0.0, 1.0), repeat=3)))
+    view = background.setup_view(fit_camera(points, height=64), points, 0.0)
+    moved = background.translate_view(view, np.zeros(2), np.array([[0.5, 0.5], [0.2, 0.9], [99, 0]]))
+    whole = background.background_rows(moved, slice(None))
+    assert len(moved.dots) == 2
+    assert np.abs(whole - background.background_rows(view, slice(None))).max() > 0.1
+    bands = [background.background_rows(moved, slice(top, top + 7)) for top in range(0, 64, 7)]
+    assert np.array_equal(np.concatenate(bands), whole)
 
 
 def test_more_pixels_than_memory_should_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,9 +11,9 @@ from PIL import Image
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 from anim.show.filmstrip import image_file, palette
+from anim.show.filmstrip.background import round_down
 from anim.show.filmstrip.camera import fit_camera
 from anim.show.filmstrip.rasterizer import visible_faces
-from anim.show.filmstrip.renderer import round_down
 
 RANDOM = np.random.default_rng(8)
 

@@ -32,6 +32,16 @@ def test_batches_of_pixels_draw_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     assert max(sizes) <= 100 < sum(sizes)
 
 
+def test_rows_of_a_picture_are_those_of_the_whole() -> None:
+    corners = np.random.default_rng(7).uniform(-5, 40, (60, 3, 3))
+    corners[::9, 2, 1] = np.nan
+    whole = rasterizer.visible_faces(corners, width=40, height=30)
+    assert (whole >= 0).any()
+    for height in (1, 4):
+        bands = [rasterizer.visible_faces(corners, width=40, height=height, top=top) for top in range(0, 30, height)]
+        assert np.array_equal(np.concatenate(bands)[:30], whole)
+
+
 def test_equal_triangles_are_drawn_once_where_they_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
     """As sticks of nodes at one place: 200 times the picture's area takes that of three triangles."""
     random = np.random.default_rng(5)

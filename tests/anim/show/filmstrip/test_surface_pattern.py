@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.show.filmstrip.camera import fit_camera
-from anim.show.filmstrip.surface_pattern import DARK, EDGE, LIGHT, Checker, barycentric, edges
+from anim.show.filmstrip.surface_pattern import DARK, EDGE, LIGHT, barycentric, checker, edges
 
 RANDOM = np.random.default_rng(7)
 
@@ -27,8 +27,7 @@ def test_squares_are_those_of_the_place_in_space() -> None:
     shares = RANDOM.dirichlet([1, 1, 1], 400)
     places = shares @ rest
     corners = np.repeat(camera.project(rest)[None], 400, axis=0)
-    checker = Checker(rest, faces)
-    seen = checker.brightness(corners, camera.project(places)[:, :2], np.zeros(400, int))
+    seen = checker(rest, faces)(corners, camera.project(places)[:, :2], np.zeros(400, int))
     cell = np.sqrt(1 + 1 + 9) / 10
     shifted = (places - (rest.max(axis=0) + rest.min(axis=0)) / 2) / cell
     clear = (np.abs(shifted - np.rint(shifted)) > 1e-6).all(axis=1)
