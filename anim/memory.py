@@ -75,10 +75,13 @@ class MemoryBudget:
         self._sum += size
         self.check(0)
 
-    def check(self, size: int) -> None:
-        """Raise UnsupportedError if the sum and `size` more bytes are above the limit."""
+    def check(
+        self, size: int, what: str = "decoded data", *, help: str = "raise `memory_limit`, or split the file"
+    ) -> None:
+        """Raise UnsupportedError if the sum and `size` more bytes are above the limit.
+
+        what: takes these bytes; for the message. help: the way out.
+        """
         if self._sum + size > self.limit:
-            raise UnsupportedError(
-                f"decoded data would take {(self._sum + size) / 1e9:.3g} GB or more (limit {self.limit / 1e9:.3g} GB)",
-                help="raise `memory_limit`, or split the file",
-            )
+            taken, limit = (f"{each / 1e9:.3g} GB" for each in (self._sum + size, self.limit))
+            raise UnsupportedError(f"{what} would take {taken} or more (limit {limit})", help=help)

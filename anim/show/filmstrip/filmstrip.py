@@ -10,6 +10,7 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
 from anim.errors import RangeError
+from anim.memory import MemoryBudget
 from anim.show.filmstrip import captions, palette
 from anim.show.filmstrip.background import SceneView, mark_spacing, setup_view, translate_view
 from anim.show.filmstrip.camera import AZIMUTH, ELEVATION, Camera, fit_camera
@@ -18,6 +19,7 @@ from anim.show.filmstrip.renderer import Image, render_frame
 from anim.show.filmstrip.root_path import RootPath
 from anim.show.filmstrip.surface import Surface
 from anim.show.filmstrip.surface_pattern import SurfaceMarks, checker, edges
+from anim.units import plural
 
 HEIGHT = 240  # pixels of a frame
 GAP, EDGE = 3, 12  # pixels between frames, and around all
@@ -29,7 +31,8 @@ TEXT_INSET_PX = 8  # pixels from the left of a frame to its text
 TEXT_HEIGHT_PX = captions.LINE + 3  # pixels from the bottom of a frame to the top of its text
 MAX_POINTS = 2_000_000  # for the framing of the camera
 LOOP_TOLERANCE = 1e-3  # of the displacement of vertices; the greatest loop gap of a closed loop
-MAX_PIXELS = 500_000_000  # of all pictures together, which take 3 bytes each
+SHEET_BYTES, ENCODED_BYTES = 3, 4  # of a pixel of a picture, and of the same in Pillow, which encodes it
+FRAME_BYTES = 13  # of a pixel of a frame that is drawn: grid, shadow and colors
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +84,8 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     """Return the picture (H, W, 3) of all rows, clip by clip; long rows are wrapped.
 
     Rows of one clip are wrapped together, so that methods can be compared at the same times.
-    Raises RangeError for pictures of less than 32 or more than 4096 pixels.
+    Raises RangeError for frames of less than 32 or more than 4096 pixels, UnsupportedError for a picture beyond the
+    limit of memory.
     """
     camera = _fit_camera(extent, look)
     width, height = camera.width, camera.height
@@ -90,9 +94,11 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     per_line, pitch = _grid(width)
     columns = max(_columns(row, per_line)[0] for row in rows)
     across = max(columns * pitch - GAP, _header_width(rows, title))
-    sheet = _blank_image(
-        header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP, across + 2 * EDGE
-    )
+    tall = header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP
+    wide = across + 2 * EDGE
+    size = (SHEET_BYTES + ENCODED_BYTES) * tall * wide
+    _check_memory(f"a picture of {wide} × {tall} pixels", size, camera)
+    sheet = _blank_image(tall, wide)
     captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
     scenery = _setup_scene(extent, camera)
     top = header
@@ -165,7 +171,7 @@ def animate_frames(
 ) -> Iterator[Image]:
     """Yield the frames (H, W, 3) of a looped film, rows side by side; short ones repeat the last frame.
 
-    Raises RangeError for more than MAX_PIXELS.
+    Raises UnsupportedError for more than the limit of memory allows, as if all were kept.
     """
     camera = _fit_camera(extent, look)
     width, height = camera.width, camera.height
@@ -177,7 +183,8 @@ def animate_frames(
     across = max(columns * pitch - GAP, _header_width(rows, title)) + 2 * EDGE
     tall = header + -(-len(rows) // columns) * cell - CLIP_SPACING_PX + LINE + EDGE
     times, most = film_times(rows), _max_extent(rows)
-    _check_size(tall, across, len(times))
+    size = ENCODED_BYTES * tall * across * len(times)
+    _check_memory(f"{plural(len(times), 'frame')} of {across} × {tall} pixels", size, camera)
     scenery = _setup_scene(extent, camera)
     frames = [_repeat_last(_frames(row, scenery, most, look)) for row in rows]
     for time, *pictures in zip(times, *frames, strict=False):
@@ -224,17 +231,13 @@ def _is_loop(rows: Sequence[Strip]) -> bool:
 
 
 def _blank_image(height: int, width: int) -> Image:
-    _check_size(height, width, 1)
     return np.full((height, width, 3), BACKGROUND, np.uint8)
 
 
-def _check_size(height: int, width: int, frames: int) -> None:
-    if height * width * frames > MAX_PIXELS:
-        what = "the picture has" if frames == 1 else f"{frames} frames have"
-        raise RangeError(
-            f"{what} {width} × {height} pixels, too many (limit {MAX_PIXELS // 10**6} million together)",
-            help="ask for fewer or smaller frames",
-        )
+def _check_memory(what: str, size: int, camera: Camera) -> None:
+    """Raise UnsupportedError if pictures of `size` bytes, and a frame, take more memory than the limit."""
+    help = "ask for fewer or smaller frames, or raise `memory_limit`"
+    MemoryBudget(0).check(size + FRAME_BYTES * camera.width * camera.height, what, help=help)
 
 
 def _fit_camera(extent: Extent, look: ViewOptions) -> Camera:
