@@ -13,9 +13,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError, check_number
-from anim.sampling.times import frame_times
+from anim.memory import MemoryBudget
+from anim.sampling.times import check_duration, check_fps, frame_times
 
 MAX_STEPS = 10_000_000
+SHORTER = "choose a shorter `duration`, a lower `fps` or a longer `step`, or raise `memory_limit`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,16 @@ class Steps:
     def num_warm_up_steps(self) -> int:
         """Number of steps before 0."""
         return _count(self.warm_up_s / self.step_s)
+
+    def check_memory(self, who: str, *, step_bytes: int = 0, fps: float, frame_bytes: int = 0) -> None:
+        """Raise UnsupportedError for more steps and frames than the limit of memory allows, before they are computed.
+
+        who: has a state of `step_bytes` at each step from 0 on, and of `frame_bytes` at each frame.
+        """
+        check_fps(fps)
+        num_frames = math.ceil(check_duration(0.0, self.duration_s, fps=fps)) + 1
+        size = step_bytes * (self.num_steps + 1) + frame_bytes * num_frames
+        MemoryBudget(0).check(size, f"{self.duration_s:g} s of {who}", help=SHORTER)
 
     def times(self) -> Floats:
         """Return the times of all steps from 0 on: (num_steps + 1,) s."""

@@ -21,14 +21,15 @@ from anim.caches.storage import Outputs
 from anim.caches.transforms import statistics
 from anim.caches.transforms.pca import fit_basis
 from anim.caches.transforms.resample import reduce_frames
-from anim.errors import RangeError, UnsupportedError
+from anim.errors import RangeError
 from anim.gltf.authoring_parts import VERTICES
 from anim.gltf.document import Json
+from anim.memory import MemoryBudget
 from anim.model import FrameChunk, VertexCache
 from anim.units import plural
 
 DEFAULT_ERROR_PER_DIAGONAL = 1e-3  # fraction of the diagonal, without a given limit
-MAX_POSITION_BYTES = 1 << 30  # of positions, three times this in memory
+POSITION_BYTES = 36  # of a vertex in a frame: float32, in memory three times
 PORTABLE_TARGETS = 8  # guaranteed by glTF; most engines support more
 BATCH_FRAMES = 16  # frames compared at a time
 LIMIT_FRACTIONS = 0.98, 0.5  # fractions of the limit, reserve for rounding to float32; the second if the first fails
@@ -38,14 +39,14 @@ NAME, EXTRAS = "cache", "gltf_anim"
 def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write the smallest encoding within `writing.max_error` m, by default 0.1 % of the diagonal.
 
-    Raises UnsupportedError for caches over 1 GB, RangeError if no encoding satisfies the limit.
+    Raises UnsupportedError for more frames than the limit of memory allows, RangeError if no encoding is within.
     """
-    if 12 * cache.frame_count * cache.vertex_count > MAX_POSITION_BYTES:
-        raise UnsupportedError(
-            f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices are "
-            f"{12 * cache.frame_count * cache.vertex_count / 1e9:.1f} GB of positions (at most 1.1)",
-            help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed)",
-        )
+    MemoryBudget(0).check(
+        POSITION_BYTES * cache.frame_count * cache.vertex_count,
+        f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices",
+        help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed), or "
+        "raise `memory_limit`",
+    )
     whole = cache.load_all()
     limit = (
         writing.max_error if writing.max_error is not None else DEFAULT_ERROR_PER_DIAGONAL * statistics.diagonal(cache)

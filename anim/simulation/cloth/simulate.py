@@ -10,7 +10,6 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError, UnstableError
-from anim.memory import MemoryBudget
 from anim.model import Clip, FrameChunk, Scene, VertexCache
 from anim.simulation.cloth.driver import ClothDriver, bake_vertices
 from anim.simulation.cloth.elongation import ElongationRecord, join_elongations, measure_elongation
@@ -44,12 +43,13 @@ def simulate_cloth(scene: Scene, clip: Clip, node: int, pinned: Bools, options: 
     if options.solver not in SOLVERS:
         raise RangeError(f"unknown `solver` '{options.solver}' (expected {', '.join(SOLVERS)})")
     options = _with_period(options) if options.loop else options
-    Steps(1 / (options.fps * options.substeps), options.duration, options.warm_up)  # raises RangeError for too many
+    steps = Steps(1 / (options.fps * options.substeps), options.duration, options.warm_up)  # RangeError for too many
     baker = prepare_bake(scene, rigid=True, nodes=[node])
     template = baker.bake(Clip("", ()), times=np.zeros(1))
     start = np.concatenate([chunk.positions for chunk in template.chunks()])[0].astype(np.float64)
     model = build_cloth(start, template.faces, pinned, options.fabric, self_collision=options.self_collision)
-    MemoryBudget(0).check(options.num_frames * (8 * 3 * len(model.masses) + 4 * 3 * len(start)))
+    frame_bytes = 8 * 3 * len(model.masses) + 4 * 3 * len(start)
+    steps.check_memory(f"{len(start)} vertices", fps=options.fps, frame_bytes=frame_bytes)
     followers = model.topology.first_vertex[model.pinned]
     pinned_baker = bake_vertices(scene, node, followers)
     driver = ClothDriver(baker, pinned_baker, clip, scene, options.obstacles, options.environment.period)

@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError, UnstableError
+from anim.memory import MemoryBudget
 from anim.simulation.integrators import find_integrator
 from anim.simulation.particles.attractors import Attractor
 from anim.simulation.particles.emission import Births
@@ -16,7 +17,10 @@ from anim.simulation.particles.forces import Forces, pack_forces
 from anim.simulation.particles.node_motion import NodeMotion
 from anim.simulation.particles.obstacles import Obstacle, pack_obstacles
 from anim.simulation.steps import Steps
+from anim.units import plural
 
+FEWER = "choose fewer particles, a shorter `lifetime` or `duration`, or a lower `fps`, or raise `memory_limit`"
+KEY_BYTES = 900  # of a key, until it is written: a cubic in float64, copied several times
 EXACT = ("verlet", "velocity-verlet", "rk4")  # for a constant acceleration
 
 
@@ -87,13 +91,15 @@ class ParticleSolver:
     def run(self, steps: Steps, substeps: int) -> ParticleKeys:
         """Return the keys of the run: births, impacts, deaths, and where paths aren't parabolas, every frame.
 
-        substeps: steps per frame. Raises UnstableError, whose `step` is the first bad step.
+        substeps: steps per frame. Raises UnstableError, whose `step` is the first bad step, and UnsupportedError for
+        more keys than the limit of memory allows.
         """
         from anim.simulation.particles.kernels.contact import Grid
         from anim.simulation.particles.kernels.force_field import METHODS
         from anim.simulation.particles.kernels.particle_run import STATISTICS, run_particles
         from anim.simulation.particles.kernels.solids import MOVING
 
+        self._check_memory(steps, substeps)
         first = -steps.num_warm_up_steps
         times: Floats = np.arange(first, steps.num_steps + 1, dtype=np.float64) * steps.step_s
         motion = self._motion
@@ -135,6 +141,14 @@ class ParticleSolver:
             figures["energy_change"] / figures["kinetic_s"] if figures["kinetic_s"] else 0.0,
             int(figures["inside"]),
         )
+
+    def _check_memory(self, steps: Steps, substeps: int) -> None:
+        """Count keys before they are computed: two of each particle, and where paths aren't parabolas every frame."""
+        births, frame_s = self._births, substeps * steps.step_s
+        lives = np.minimum(births.deaths, steps.duration_s) - np.maximum(births.times, 0.0)
+        num_keys = 2 * len(births) + (0 if self._is_exact else int(np.maximum(lives, 0.0).sum() / frame_s))
+        what = f"{steps.duration_s:g} s of {plural(len(births), 'particle')}"
+        MemoryBudget(0).check(KEY_BYTES * num_keys, what, help=FEWER)
 
 
 class DivergedError(UnstableError):

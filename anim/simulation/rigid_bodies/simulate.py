@@ -30,6 +30,7 @@ from anim.simulation.rigid_bodies.report import make_report
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from anim.simulation.steps import Steps
 
+STEP_BYTES, FRAME_BYTES = 200, 300  # of a body at each step and frame, while they become keys
 MAX_ROUNDS = 20  # of the clip, until bodies repeat their motion
 
 
@@ -52,7 +53,7 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     """Return the tracks of all bodies, from the start of the clip on.
 
     Raises UnstableError with a report for a run that diverges, RangeError without a body, or for a loop of bodies that
-    nothing moves again.
+    nothing moves again, UnsupportedError for more steps than the limit of memory allows.
     """
     skeleton, start = scene.skeleton, clip.start
     clip = Clip(clip.name, tuple(shift_time(track, -start) for track in clip.tracks))
@@ -66,6 +67,9 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
             help=("leave it out: players repeat any clip"),
         )
     rounds = MAX_ROUNDS if options.loop else 1
+    count = len(rigid.moving)
+    sizes = {"step_bytes": STEP_BYTES * count, "frame_bytes": FRAME_BYTES * count}
+    steps.check_memory(f"{count} moving bodies", fps=options.fps, **sizes)
     try:
         motion = run_scene(rigid, skeleton, clip, steps, substeps=substeps, max_rounds=rounds)
     except UnstableError as error:

@@ -18,9 +18,11 @@ from anim.simulation.spring_bones.hierarchy import check_hierarchy, scale_bones,
 from anim.simulation.spring_bones.loop import LoopedMotion, run_loop
 from anim.simulation.spring_bones.solver import SpringMotion, SpringSolver
 from anim.simulation.steps import Steps
+from anim.units import plural
 
 DEFAULT_STEP_S = 1 / 60  # the rate of players: drag is per step, so another step is another motion
 MIN_LOOP_STEPS = 2
+STEP_BYTES, FRAME_BYTES = 80, 180  # of a joint at each step and frame, while they become keys
 STEP_TOLERANCE = 1e-9  # of a step: rounding of n · step
 
 
@@ -77,8 +79,8 @@ def simulate_springs(
     clip: the driver, evaluated at every step; without tracks it is the rest pose. Its other tracks stay as they are;
     rotation tracks of joints are replaced. Keys are LINEAR, at the steps or at `fps` frames per second, with an exact
     end.
-    Raises FormatError for chains that don't fit the skeleton, RangeError for times out of range, and UnstableError
-    where numbers get too large.
+    Raises FormatError for chains that don't fit the skeleton, RangeError for times out of range, UnsupportedError for
+    more steps than the limit of memory allows, and UnstableError where numbers get too large.
     """
     check_hierarchy(skeleton, bones)
     chains, notes = drop_inert_joints(skeleton, bones.chains)
@@ -157,10 +159,12 @@ def _run(
     if options.loop:
         num_steps = max(round(duration / options.step), MIN_LOOP_STEPS)
         steps = Steps(duration / num_steps, duration, options.warm_up)
+    count = len(bones.nodes)
+    sizes = {"step_bytes": STEP_BYTES * count, "frame_bytes": FRAME_BYTES * count}
+    steps.check_memory(plural(count, "joint"), fps=options.fps, **sizes)
     solver = SpringSolver(skeleton, clip, bones, step=steps.step_s, integrator=options.integrator)
     solver.start(0.0)
-    if steps.num_warm_up_steps:
-        solver.run(np.zeros(steps.num_warm_up_steps))
+    solver.warm_up(0.0, steps.num_warm_up_steps)
     if options.loop:
         looped = run_loop(solver, steps)
         return steps, looped, looped.motion

@@ -61,9 +61,15 @@ class SpringSolver:
         for level in self._levels:
             level.start(self._world)
 
-    def run(self, times: Floats) -> SpringMotion:
+    def warm_up(self, time: float, num_steps: int) -> None:
+        """Advance by steps in the driver's pose at `time` seconds, without recording them. Raises UnstableError."""
+        for first in range(0, num_steps, CHUNK_STEPS):
+            self.run(np.full(min(CHUNK_STEPS, num_steps - first), time), num_before=first)
+
+    def run(self, times: Floats, *, num_before: int = 0) -> SpringMotion:
         """Advance by one step to each of the times (S,), and return the motion.
 
+        num_before: steps done before, which count in the report of an error.
         Raises UnstableError at the first value that is not finite.
         """
         size = (len(times), self._num_joints)
@@ -77,7 +83,7 @@ class SpringSolver:
                     self._world[:driven] = chunk.world[frame]
                     for level in self._levels:
                         level.advance(self._world, frame, motion, first + frame)
-            _check_finite(motion, times, first, first + len(part))
+            _check_finite(motion, times, first, first + len(part), num_before)
         return motion
 
     def jump(self, before: float, after: float) -> None:
@@ -160,10 +166,10 @@ def _driven_centers(bones: SpringBones, plan: Plan) -> Ints:
     return np.array([row if row < len(plan.driven) else -2 for row in rows], np.int64)
 
 
-def _check_finite(motion: SpringMotion, times: Floats, first: int, end: int) -> None:
+def _check_finite(motion: SpringMotion, times: Floats, first: int, end: int, num_before: int) -> None:
     wrong = ~np.isfinite(motion.rotations[first:end]).all(axis=(1, 2))
     if wrong.any():
         raise UnstableError(
             f"the springs diverge at {times[first + int(wrong.argmax())]:.4g} s: numbers are too large",
             help="smaller `stiffness` and `gravity`, or `frequency` and `damping_ratio`, which are always stable",
-        ).with_report(first + int(wrong.argmax()))
+        ).with_report(num_before + first + int(wrong.argmax()))

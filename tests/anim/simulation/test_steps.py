@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.errors import RangeError
+from anim.errors import RangeError, UnsupportedError
+from anim.memory import memory_limit
 from anim.simulation.steps import Steps
 
 
@@ -21,3 +22,13 @@ def test_steps_are_counted_by_integers() -> None:
 def test_steps_without_sense_are_refused(values: tuple[float, float]) -> None:
     with pytest.raises(RangeError):
         Steps(*values)
+
+
+def test_steps_and_frames_count_for_the_limit_of_memory() -> None:
+    steps = Steps(0.1, 10.0)
+    with memory_limit(1000):
+        steps.check_memory("2 joints", step_bytes=5, fps=2.0, frame_bytes=20)  # 101 steps, 21 frames
+        with pytest.raises(UnsupportedError, match=r"10 s of 2 joints would take 1\.03e-06 GB or more"):
+            steps.check_memory("2 joints", step_bytes=6, fps=2.0, frame_bytes=20)
+    with pytest.raises(RangeError, match="`fps` is 0"):
+        steps.check_memory("2 joints", fps=0.0)

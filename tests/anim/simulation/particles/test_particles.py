@@ -51,7 +51,7 @@ def solve(
 ) -> ParticleKeys:
     births = Births(np.zeros(1), np.full(1, 99.0), np.array([position], float), np.array([velocity], float))
     solver = ParticleSolver(births, forces or Forces(), obstacles, contact or Contact(), integrator)
-    return solver.run(Steps(step, seconds), round(1 / 60 / step))
+    return solver.run(Steps(step, seconds), max(round(1 / 60 / step), 1))
 
 
 def test_a_projectile_is_its_parabola_between_two_keys() -> None:
