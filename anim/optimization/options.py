@@ -78,11 +78,12 @@ class Policy:
 class Effort:
     """The extent of a search.
 
-    rounds: of feedback. thresholds: fractions of the bound tried as tolerance for constant tracks. axes: further
-    layouts of time axes. long_track_rounds: rounds with larger budgets for long tracks. leeways: exponents on the
-    budget gain of world-space compensation. finishing: factors tried on all budgets at the end. random_trials: number
-    of random changes. coarsen_passes: passes of coarser storage, track by track, with a codec. cycles: maximum
-    repetitions of all stages, as long as one saves bytes. also_try: another effort; the smaller result counts.
+    rounds: of feedback. groups: layouts that find groups of tracks with an axis each. thresholds: fractions of the
+    bound tried as tolerance for constant tracks. axes: further layouts of time axes. long_track_rounds: rounds with
+    larger budgets for long tracks. leeways: exponents on the budget gain of world-space compensation. finishing:
+    factors tried on all budgets at the end. random_trials: number of random changes. coarsen_passes: passes of coarser
+    storage, track by track, with a codec. cycles: maximum repetitions of all stages, as long as one saves bytes.
+    also_try: another effort; the smaller result counts.
     """
 
     rounds: int
@@ -95,14 +96,18 @@ class Effort:
     coarsen_passes: int = 0
     cycles: int = 1
     also_try: Effort | None = None
+    groups: tuple[str, ...] = ()
 
     def all(self) -> list[Effort]:
         """Return all efforts to run in turn; the smallest result counts."""
         return [*(self.also_try.all() if self.also_try else ()), self]
 
 
+GROUPS = ("wide groups", "groups")  # names in LAYOUTS
 FAST = Effort(5)
-BALANCED = Effort(5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), random_trials=30, coarsen_passes=2)
+BALANCED = Effort(
+    5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), random_trials=20, coarsen_passes=2, groups=GROUPS
+)
 MAX = Effort(
     10,
     (0.1, 0.25, 0.4, 0.6, 0.8),
@@ -114,6 +119,7 @@ MAX = Effort(
     coarsen_passes=2,
     cycles=3,
     also_try=BALANCED,
+    groups=GROUPS,
 )
 EFFORTS = {"fast": FAST, "balanced": BALANCED, "max": MAX}
 

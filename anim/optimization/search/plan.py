@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from typing import TypeAlias
 
 from anim.arrays import Bools, Floats, Ints
 from anim.gltf.validation.buffer_layout import COMPONENT_SIZES
 from anim.model import Clip, Interpolation, Track
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
+
+Groups: TypeAlias = tuple[tuple[int, ...], ...]  # tracks that share a time axis
 
 COMPONENTS = {Interpolation.STEP: 1, Interpolation.LINEAR: 1, Interpolation.CUBICSPLINE: 3}  # values per key
 
@@ -34,7 +37,8 @@ class Plan:
     """Parameters of a trial.
 
     budgets: (G,) m, permitted error of each track. threshold: m, minimum tolerance for tracks to be dropped or
-    constant. axes: layout of time axes, a name in LAYOUTS. coarser: (G,) factors on the tolerance of storage.
+    constant. axes: layout of time axes, a name in LAYOUTS. coarser: (G,) factors on the tolerance of storage. groups:
+    of the layout "groups", empty to find them.
     """
 
     budgets: Floats
@@ -42,6 +46,7 @@ class Plan:
     axes: str
     coarser: Floats
     rotation_target: RotationTarget = RotationTarget.LOCAL
+    groups: Groups = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +65,14 @@ class TrialResult:
     usage: Floats
     own: Floats
     size: float
+
+    @property
+    def groups(self) -> Groups:
+        """The tracks of each time axis; different axes with equal keys count as one."""
+        groups: dict[bytes, list[int]] = {}
+        for i, keys in sorted(self.on.items()):
+            groups.setdefault(keys.tobytes(), []).append(i)
+        return tuple(map(tuple, groups.values()))
 
     @property
     def worst(self) -> float:

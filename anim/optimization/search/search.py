@@ -13,6 +13,7 @@ from anim.arrays import Floats
 from anim.optimization.options import Effort
 from anim.optimization.search.plan import Plan, RotationTarget, TrialResult
 from anim.optimization.search.source_motion import SourceMotion
+from anim.optimization.search.time_axes import GROUPING_LAYOUTS
 from anim.optimization.search.trial import Trial
 from anim.optimization.tracks import quantization
 
@@ -77,6 +78,7 @@ class _Search:
     def _run_cycle(self) -> Step:
         """Try every kind of change in turn, each on the best result so far."""
         assert self._best is not None
+        yield from self._share_axes()
         for fraction in self._effort.thresholds:
             plan = replace(self._best.plan, threshold=fraction * self._bound)
             yield from self._adapt(replace(plan, budgets=0.9 * plan.budgets), self._effort.rounds)
@@ -86,6 +88,18 @@ class _Search:
         yield from self._compensate_parents()
         yield from self._finish()
         yield from self._coarsen_each()
+
+    def _share_axes(self) -> Step:
+        """Try groups of tracks whose axes have the keys that all of them require together.
+
+        Groups stay during the feedback, and the next ones are found under its budgets.
+        """
+        assert self._best is not None
+        plan = self._best.plan
+        for name in self._effort.groups:
+            first = yield from self._measure(replace(plan, axes=name, groups=()))
+            plan = replace(_with_groups(first).plan, budgets=self._next_budgets(plan.budgets, first))
+            plan = yield from self._adapt(plan, self._effort.rounds - 1)
 
     def _favor_long(self) -> Step:
         """Try larger budgets for tracks with many bytes.
@@ -134,21 +148,30 @@ class _Search:
 
     def _keep_smaller(self, outcome: TrialResult) -> None:
         if outcome.worst <= 1 and (self._best is None or outcome.size < self._best.size):
-            self._best = outcome
+            self._best = _with_groups(outcome)
 
-    def _adapt(self, plan: Plan, rounds: int) -> Step:
-        """Try a plan, adjust each budget by the usage of the points it moves, and repeat."""
-        for _ in range(rounds - 1):
+    def _adapt(self, plan: Plan, rounds: int) -> Generator[Trial, TrialResult | None, Plan]:
+        """Try a plan, adjust each budget by the usage of the points it moves, and repeat; return the last plan.
+
+        Budgets only fall before the last trial: what grew would be over the bound as often as within it.
+        """
+        for left in range(rounds - 1, 0, -1):
             outcome = yield from self._measure(plan)
-            plan = replace(plan, budgets=self._next_budgets(plan.budgets, outcome))
+            largest = BUDGET_FACTOR_RANGE[1] if left > 1 else 1.0
+            plan = replace(plan, budgets=self._next_budgets(plan.budgets, outcome, largest))
         if rounds:
             yield from self._attempt(plan)
+        return plan
 
-    def _next_budgets(self, budgets: Floats, outcome: TrialResult) -> Floats:
+    def _next_budgets(
+        self, budgets: Floats, outcome: TrialResult, largest_factor: float = BUDGET_FACTOR_RANGE[1]
+    ) -> Floats:
         source = self._source
         usage = source.answering.largest(outcome.usage, [each.node for each in source.moving])
         usage = np.maximum(usage, outcome.own)
-        factor = np.clip((TARGET_USAGE / np.maximum(usage, 1e-9)) ** FEEDBACK_EXPONENT, *BUDGET_FACTOR_RANGE)
+        factor = np.clip(
+            (TARGET_USAGE / np.maximum(usage, 1e-9)) ** FEEDBACK_EXPONENT, BUDGET_FACTOR_RANGE[0], largest_factor
+        )
         gain = self._find_leeway() if outcome.plan.rotation_target is RotationTarget.WORLD else 1.0
         return np.asarray(np.minimum(budgets * factor, MAX_BUDGET_PER_BOUND * self._bound * gain))
 
@@ -223,6 +246,13 @@ class _Search:
             changes = spread * chance.standard_normal(tracks) * (chance.random(tracks) < CHANGED_TRACK_FRACTION)
             yield from self._attempt(replace(best.plan, budgets=best.plan.budgets * np.exp(changes)))
             spread = spread * 1.3 if self._best is not best else max(0.96 * spread, LOG_DEVIATIONS[1])
+
+
+def _with_groups(outcome: TrialResult) -> TrialResult:
+    """The result with a plan that keeps the groups that it found, if any."""
+    if outcome.plan.axes not in GROUPING_LAYOUTS:
+        return outcome
+    return replace(outcome, plan=replace(outcome.plan, axes="groups", groups=outcome.groups))
 
 
 def _length(outcome: TrialResult | None, track: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +59,38 @@ class SegmentErrors:
 
         About 1 within the budget, inf above it and where there is no segment. ends: some of the keys.
         """
-        shares = self._errors[ends, tracks] * (1 / budgets).astype(np.float32)[:, None]
-        return np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
+        return _costs(self._errors[ends, tracks] * (1 / budgets).astype(np.float32)[:, None])
+
+    def shared_costs(self, groups: Sequence[Ints], budgets: Floats) -> NDArray[np.float32]:
+        """Return the costs (K, A, span) of segments that all tracks of a group have in common, as of `costs`.
+
+        groups: A groups of k tracks in all. budgets: (k,) m, in their order.
+        """
+        shares = self._errors[:, np.concatenate(groups)] * (1 / budgets).astype(np.float32)[:, None]
+        firsts = np.cumsum([0, *map(len, groups[:-1])])
+        return _costs(np.maximum.reduceat(shares, firsts, axis=1))
+
+    def reach(self, tracks: Ints, budgets: Floats) -> Ints:
+        """Return for each key (k, K) of the `tracks` (k,) the last one that a segment reaches under budgets (k,) in m.
+
+        All shorter segments from there are within it too: what several tracks reach together is the least of them.
+        """
+        count = len(self)
+        longer = np.count_nonzero(self._largest[:, :, tracks] <= budgets, axis=0).T
+        return np.asarray(np.minimum(np.arange(1, count + 1) + longer, count - 1))
+
+    @cached_property
+    def _largest(self) -> NDArray[np.float32]:
+        """[n, s, g]: the largest error of the segments from key s over 2 … n + 2 intervals; infinite past the end."""
+        count, tracks, span = self._errors.shape
+        largest = np.full((span - 1, count, tracks), np.inf, np.float32)
+        for n in range(1, min(span, count - 1)):
+            largest[n - 1, : count - n - 1] = self._errors[n + 1 :, :, n]
+        return np.asarray(np.maximum.accumulate(largest, axis=0))
+
+
+def _costs(shares: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.where(shares <= 1, 1 + ERROR_WEIGHT * shares, np.float32(np.inf))
 
 
 def tabulate(asked: Sequence[Tabulated]) -> list[SegmentErrors]:
@@ -128,7 +159,8 @@ def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Boo
     waiting: list[NDArray[np.float32]] = []
     for errors, tracks, budgets in asked:
         is_long = len(errors) > KEYS_PER_PART
-        if waiting and (is_long or _stacked_size(waiting, errors, len(tracks)) > MAX_JOINT_TABLE_VALUES):
+        size = len(errors), len(tracks), errors.span
+        if waiting and (is_long or _stacked_size(waiting, size) > MAX_JOINT_TABLE_VALUES):
             found += _stacked_keys(waiting)
             waiting = []
         if is_long:
@@ -138,9 +170,24 @@ def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Boo
     return found + (_stacked_keys(waiting) if waiting else [])
 
 
-def _stacked_size(waiting: Sequence[NDArray[np.float32]], errors: SegmentErrors, tracks: int) -> int:
-    """Values of tables of costs (K, k, span) in one array with those of some tracks of another one."""
-    counts, widths, spans = zip((len(errors), tracks, errors.span), *(costs.shape for costs in waiting), strict=True)
+def shared_keys(asked: Sequence[tuple[SegmentErrors, Sequence[Ints], Floats]]) -> list[Bools]:
+    """Return the keys (A, K) of the groups of tracks of each table, so that no segment exceeds a budget of its tracks.
+
+    Groups and budgets are those of `SegmentErrors.shared_costs`; tables have up to KEYS_PER_PART keys.
+    """
+    found: list[Bools] = []
+    waiting: list[NDArray[np.float32]] = []
+    for errors, groups, budgets in asked:
+        if waiting and _stacked_size(waiting, (len(errors), len(groups), errors.span)) > MAX_JOINT_TABLE_VALUES:
+            found += _stacked_keys(waiting)
+            waiting = []
+        waiting.append(errors.shared_costs(groups, budgets))
+    return found + (_stacked_keys(waiting) if waiting else [])
+
+
+def _stacked_size(waiting: Sequence[NDArray[np.float32]], size: tuple[int, ...]) -> int:
+    """Values of tables of costs (K, k, span) in one array with another one of this size."""
+    counts, widths, spans = zip(size, *(costs.shape for costs in waiting), strict=True)
     return int(max(counts) * sum(widths) * max(spans))
 
 

@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from functools import partial
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.curves.fitting.key_reduction import greedy_keys, joint_greedy_keys
+from anim.curves.fitting.key_reduction import KEYS_PER_PART, greedy_keys, joint_greedy_keys
 from anim.optimization.search import segment_errors
+from anim.optimization.search.axis_groups import AxisCosts, group_tracks
 from anim.optimization.search.axis_merging import SharedAxis, merge_axes
+from anim.optimization.search.plan import Groups
 from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, fits
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.tracks.quantization import Encoding
 
 CONSTANT_TOLERANCE = 0.1  # of the bound: tracks this close to their middle value get no table
 MAX_TABLED_BUDGET = 4.0  # of the bound; larger budgets are rare
+MAX_GROUPED_VALUES = 4_000_000  # tracks² × keys whose pairs are compared for groups: 32 MB, and seconds
+
+
+class Asked(NamedTuple):
+    """The tracks `keyed` (k,) of a clip that need axes, with the budgets (G,), m, of all its tracks.
+
+    groups: of tracks that share an axis in the layout of groups; empty to find them.
+    """
+
+    layouts: TimeAxisSearch
+    keyed: Ints
+    budgets: Floats
+    groups: Groups = ()
 
 
 class TimeAxisSearch:
@@ -37,6 +53,7 @@ class TimeAxisSearch:
             self._tabled = np.empty(0, np.int64)
         self._is_tabled = np.zeros(len(moved), np.bool_)
         self._is_tabled[self._tabled] = True
+        self._is_groupable = len(self._tabled) ** 2 * len(source.grid) <= MAX_GROUPED_VALUES
         self.tabulated = Tabulated(self._scaled[self._tabled], source.grid, MAX_TABLED_BUDGET * bound)
         self.segments: SegmentErrors | None = None
         self._rows: dict[tuple[int, float], Bools] = {}
@@ -60,8 +77,27 @@ class TimeAxisSearch:
     def from_table(self, tracks: Ints, budgets: Floats) -> tuple[Ints, tuple[SegmentErrors, Ints, Floats]]:
         """Return those of some tracks that are in the table, with what `segment_errors.greedy_keys` takes for them."""
         there = tracks[self._is_tabled[tracks]]
-        assert self.segments is not None
-        return there, (self.segments, np.searchsorted(self._tabled, there), budgets[there])
+        return there, (self._table, np.searchsorted(self._tabled, there), budgets[there])
+
+    def can_group(self, tracks: Ints) -> bool:
+        """Return whether there is a table for all of some tracks, and they are not too many for groups."""
+        return self._is_groupable and len(self.grid) <= KEYS_PER_PART and bool(self._is_tabled[tracks].all())
+
+    def find_groups(self, keyed: Ints, budgets: Floats, key_bytes_factor: float) -> list[Ints]:
+        """Return the tracks in groups with an axis each."""
+        reach = self._table.reach(np.searchsorted(self._tabled, keyed), budgets[keyed])
+        costs = AxisCosts(self.coding.byte_costs.axis, self.coding.time_bytes, key_bytes_factor * self.key_bytes[keyed])
+        return [np.sort(keyed[each]) for each in group_tracks(reach, costs)]
+
+    def table_of_groups(self, groups: Sequence[Ints], budgets: Floats) -> tuple[SegmentErrors, list[Ints], Floats]:
+        """Return what `segment_errors.shared_keys` takes for groups of tracks."""
+        rows = [np.searchsorted(self._tabled, each) for each in groups]
+        return self._table, rows, budgets[np.concatenate(groups)]
+
+    @property
+    def _table(self) -> SegmentErrors:
+        assert self.segments is not None, "`_tabulate` makes the tables of all clips together"
+        return self.segments
 
     def search_others(self, tracks: Ints, budgets: Floats) -> None:
         """Find the keys of those of some tracks that are in no table."""
@@ -76,17 +112,17 @@ class TimeAxisSearch:
 
 def find_axes(name: str, asked: Sequence[Asked]) -> list[list[SharedAxis]]:
     """Return the time axes of tracks of several clips, each of its own, by the layout `name`."""
-    some = [each for each in asked if len(each[1])]
+    some = [each for each in asked if len(each.keyed)]
     found = iter(LAYOUTS[name](some) if some else [])
-    return [next(found) if len(keyed) else [] for _, keyed, _ in asked]
+    return [next(found) if len(each.keyed) else [] for each in asked]
 
 
 def find_keys(asked: Sequence[Asked]) -> None:
     """Find the keys that tracks of several clips require by themselves, those that are not known yet."""
-    new = [layouts.new_tracks(keyed, budgets) for layouts, keyed, budgets in asked]
+    new = [layouts.new_tracks(keyed, budgets) for layouts, keyed, budgets, _ in asked]
     _tabulate([layouts for (layouts, *_), some in zip(asked, new, strict=True) if layouts.is_tabled(some)])
     searches = []
-    for (layouts, _, budgets), some in zip(asked, new, strict=True):
+    for (layouts, _, budgets, _), some in zip(asked, new, strict=True):
         layouts.search_others(some, budgets)
         if layouts.is_tabled(some):
             searches.append((layouts, budgets, *layouts.from_table(some, budgets)))
@@ -104,7 +140,7 @@ def _tabulate(every: Sequence[TimeAxisSearch]) -> None:
 
 def _merge_by_bytes(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
     find_keys(asked)
-    return _merge([(layouts, keyed, layouts.known_keys(keyed, budgets)) for layouts, keyed, budgets in asked])
+    return _merge([(layouts, keyed, layouts.known_keys(keyed, budgets)) for layouts, keyed, budgets, _ in asked])
 
 
 def _merge(asked: Sequence[tuple[TimeAxisSearch, Ints, Bools]]) -> list[list[SharedAxis]]:
@@ -121,9 +157,37 @@ def _merge(asked: Sequence[tuple[TimeAxisSearch, Ints, Bools]]) -> list[list[Sha
     ]
 
 
+def _group_axes(asked: Sequence[Asked], key_bytes_factor: float = 1.0) -> list[list[SharedAxis]]:
+    """Axes with the fewest keys for all tracks of a group; merged ones for clips that can't have groups.
+
+    key_bytes_factor: on the bytes of keys in the choice of groups.
+    """
+    found: list[list[SharedAxis]] = [[] for _ in asked]
+    others = [n for n, each in enumerate(asked) if not each.layouts.can_group(each.keyed)]
+    for n, axes in zip(others, _merge_by_bytes([asked[n] for n in others]) if others else [], strict=True):
+        found[n] = axes
+    tabled = [n for n, each in enumerate(asked) if n not in others]
+    _tabulate([asked[n].layouts for n in tabled])
+    groups = [_groups(asked[n], key_bytes_factor) for n in tabled]
+    tables = [asked[n].layouts.table_of_groups(some, asked[n].budgets) for n, some in zip(tabled, groups, strict=True)]
+    for n, some, keys in zip(tabled, groups, segment_errors.shared_keys(tables), strict=True):
+        found[n] = [SharedAxis(mask, tuple(each.tolist())) for mask, each in zip(keys, some, strict=True)]
+    return found
+
+
+def _groups(asked: Asked, key_bytes_factor: float) -> list[Ints]:
+    """The groups that were asked for, of keyed tracks, and a group for each further track."""
+    if not asked.groups:
+        return asked.layouts.find_groups(asked.keyed, asked.budgets, key_bytes_factor)
+    keyed = set(asked.keyed.tolist())
+    groups = [np.array([i for i in each if i in keyed], np.int64) for each in asked.groups]
+    further = keyed.difference(*asked.groups)
+    return [each for each in groups if len(each)] + [np.array([i]) for i in sorted(further)]
+
+
 def _source_key_axes(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
     """Axes of source keys only: players with component-wise interpolation then deviate like the source."""
-    return [_of_source_keys(*each) for each in asked]
+    return [_of_source_keys(layouts, keyed, budgets) for layouts, keyed, budgets, _ in asked]
 
 
 def _of_source_keys(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
@@ -140,14 +204,14 @@ def _of_source_keys(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> li
 def _one_axis(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
     return [
         [SharedAxis(joint_greedy_keys(layouts.scaled(keyed, budgets), layouts.grid), tuple(keyed.tolist()))]
-        for layouts, keyed, budgets in asked
+        for layouts, keyed, budgets, _ in asked
     ]
 
 
 def _even_axis(nth: int) -> Layout:
     def layout(asked: Sequence[Asked]) -> list[list[SharedAxis]]:
         axes = []
-        for layouts, keyed, _ in asked:
+        for layouts, keyed, *_ in asked:
             keys = np.zeros(len(layouts.grid), np.bool_)
             keys[::nth] = keys[-1] = True
             axes.append([SharedAxis(keys, tuple(keyed.tolist()))])
@@ -156,11 +220,16 @@ def _even_axis(nth: int) -> Layout:
     return layout
 
 
-Asked: TypeAlias = tuple[TimeAxisSearch, Ints, Floats]  # tracks `keyed` (k,) of a clip, and the budgets (G,) in metres
 Layout: TypeAlias = Callable[[Sequence[Asked]], list[list[SharedAxis]]]
 
+# Keys that cost half in the choice of groups give fewer axes: which is smaller shows after feedback.
+GROUPING_LAYOUTS: dict[str, Layout] = {
+    "groups": _group_axes,
+    "wide groups": partial(_group_axes, key_bytes_factor=0.5),
+}
 LAYOUTS: dict[str, Layout] = {
     "merged": _merge_by_bytes,
+    **GROUPING_LAYOUTS,
     "own": _source_key_axes,
     "joint": _one_axis,
     "full": _even_axis(1),

@@ -19,7 +19,7 @@ from anim.optimization.search.parent_compensation import ParentCompensation, bud
 from anim.optimization.search.plan import RotationTarget, TrackAction, TrialResult
 from anim.optimization.search.source_motion import PATHS, ROTATION
 from anim.optimization.search.stacked_clips import StackedClips
-from anim.optimization.search.time_axes import find_axes
+from anim.optimization.search.time_axes import Asked, find_axes
 from anim.optimization.search.trial import ClipTrials, Decisions, Trial
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
@@ -106,7 +106,7 @@ class TrialBatch:
             for n in places:
                 clip, trial = requests[n]
                 keyed = np.flatnonzero(actions[n] == TrackAction.KEYED)
-                asked.append((self._trials[clip].layouts, keyed, trial.plan.budgets))
+                asked.append(Asked(self._trials[clip].layouts, keyed, trial.plan.budgets, trial.plan.groups))
             for n, axes in zip(places, find_axes(name, asked), strict=True):
                 found[n] = axes
         return found

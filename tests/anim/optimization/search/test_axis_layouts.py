@@ -10,7 +10,7 @@ from anim.model import Clip
 from anim.optimization.options import EFFORTS
 from anim.optimization.search import segment_errors, time_axes
 from anim.optimization.search.axis_merging import SharedAxis
-from anim.optimization.search.time_axes import LAYOUTS, TimeAxisSearch, find_axes, find_keys
+from anim.optimization.search.time_axes import LAYOUTS, Asked, TimeAxisSearch, find_axes, find_keys
 from tests.anim.optimization.making import (
     CORE,
     TIMES,
@@ -32,12 +32,12 @@ def _layouts(what: Clip | None = None) -> TimeAxisSearch:
 
 
 def _axes(layouts: TimeAxisSearch, name: str, keyed: Ints, budgets: Floats) -> list[SharedAxis]:
-    (axes,) = find_axes(name, [(layouts, keyed, budgets)])
+    (axes,) = find_axes(name, [Asked(layouts, keyed, budgets)])
     return axes
 
 
 def _keys(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> Bools:
-    find_keys([(layouts, keyed, budgets)])
+    find_keys([Asked(layouts, keyed, budgets)])
     return layouts.known_keys(keyed, budgets)
 
 
@@ -54,7 +54,7 @@ def test_every_keyed_track_is_on_one_axis_with_both_ends(name: str) -> None:
     assert _axes(_layouts(), name, KEYED[:0], BUDGETS) == []
 
 
-@pytest.mark.parametrize("name", ["merged", "joint", "full"])
+@pytest.mark.parametrize("name", ["merged", "groups", "wide groups", "joint", "full"])
 def test_lines_between_an_axis_keys_keep_every_budget(name: str) -> None:
     layouts = _layouts()
     of = scene()
@@ -65,6 +65,22 @@ def test_lines_between_an_axis_keys_keep_every_budget(name: str) -> None:
             lines = [np.interp(layouts.grid, layouts.grid[axis.keys], column[axis.keys]) for column in values.T]
             off = np.linalg.norm(np.transpose(lines) - values, axis=1).max()
             assert off * moving[i].meters <= BUDGETS[i] * (1 + 1e-9)
+
+
+def test_given_groups_stay_but_for_tracks_without_keys() -> None:
+    """A track that is in no group has an axis of its own."""
+    budgets = np.full(5, 0.02)
+    asked = Asked(_layouts(), KEYED, budgets, ((2, 0, 4), (3,)))
+    (axes,) = find_axes("groups", [asked])
+    assert [axis.members for axis in axes] == [(2, 0), (1,)]
+    assert axes[0].num_keys >= _axes(asked.layouts, "groups", KEYED[:1], budgets)[0].num_keys
+
+
+def test_an_axis_of_a_group_has_no_more_keys_than_its_tracks_together() -> None:
+    layouts = _layouts()
+    (axes,) = find_axes("groups", [Asked(layouts, KEYED, BUDGETS, (tuple(KEYED.tolist()),))])
+    each = _keys(layouts, KEYED, BUDGETS)
+    assert each.sum(axis=1).max() <= axes[0].num_keys <= np.count_nonzero(each.any(axis=0))
 
 
 def test_regular_axes() -> None:
@@ -84,7 +100,7 @@ def test_larger_budgets_need_fewer_keys_and_what_was_found_is_kept(monkeypatch: 
 
 
 def test_efforts_name_layouts() -> None:
-    assert {name for effort in EFFORTS.values() for name in effort.axes} <= set(LAYOUTS)
+    assert {name for effort in EFFORTS.values() for name in (*effort.axes, *effort.groups)} <= set(LAYOUTS)
 
 
 def test_own_keys_are_those_of_the_source() -> None:
@@ -112,12 +128,14 @@ def test_axes_of_clips_together_are_those_of_each_alone(
     keyed = (KEYED, KEYED[:0], KEYED[1:], KEYED)
     clips = (waving(), waving(), nodding(), stepping())
 
-    def asked() -> list[tuple[TimeAxisSearch, Ints, Floats]]:
-        return [(_layouts(what), some, budgets[: len(what.tracks)]) for what, some in zip(clips, keyed, strict=True)]
+    def asked() -> list[Asked]:
+        return [
+            Asked(_layouts(what), some, budgets[: len(what.tracks)]) for what, some in zip(clips, keyed, strict=True)
+        ]
 
     together = find_axes(name, asked())
     assert [sorted(i for axis in axes for i in axis.members) for axes in together] == [some.tolist() for some in keyed]
     for axes, alone in zip(together, asked(), strict=True):
-        for a, b in zip(axes, _axes(alone[0], name, *alone[1:]), strict=True):
+        for a, b in zip(axes, _axes(alone.layouts, name, alone.keyed, alone.budgets), strict=True):
             assert a.members == b.members
             np.testing.assert_array_equal(a.keys, b.keys)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from anim.optimization.options import EFFORTS
+from anim.optimization.options import EFFORTS, Effort
 from anim.optimization.search.lockstep import run_searches
 from anim.optimization.search.plan import TrackAction, TrialResult
 from anim.optimization.search.search import search
@@ -13,8 +15,12 @@ from tests.anim.optimization.search.stacks import bench
 
 
 def _found(bound: float, effort: str) -> TrialResult | None:
+    return _searched(bound, EFFORTS[effort])
+
+
+def _searched(bound: float, effort: Effort) -> TrialResult | None:
     made = bench(waving(), bound=bound)
-    steps = search(made.sources[0], bound, EFFORTS[effort], lambda: made.batch.leeway(0))
+    steps = search(made.sources[0], bound, effort, lambda: made.batch.leeway(0))
     (found,) = run_searches(made.batch, [steps])
     return found
 
@@ -31,10 +37,14 @@ def test_more_effort_and_more_room_take_fewer_bytes() -> None:
     assert sizes[3e-1, "fast"] < sizes[3e-2, "fast"] < sizes[1e-3, "fast"]
 
 
-def test_the_bound_is_used() -> None:
-    found = _found(0.1, "balanced")
+def test_the_bound_is_used_and_groups_on_an_axis_each_take_fewer_bytes() -> None:
+    found = _searched(0.1, replace(EFFORTS["balanced"], groups=()))
     assert found is not None
     assert found.worst > 0.9
+    grouped = _found(0.1, "balanced")
+    assert grouped is not None
+    assert grouped.size < found.size
+    assert grouped.plan.groups == grouped.groups  # which later trials keep
 
 
 @pytest.mark.parametrize("effort", ["fast", "balanced"])

@@ -144,3 +144,36 @@ def test_a_limit_keeps_the_keys_of_budgets_below_it() -> None:
     np.testing.assert_array_equal(limited, whole)
     assert _keys(tables[2], np.arange(4), np.full(4, 1e-6)).all()
     assert [each._errors.shape[2] for each in tables][2] == 2, "errors of longer segments are not kept in memory"
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 60), st.floats(0.1, 10))
+def test_keys_of_a_group_keep_the_budget_of_each_of_its_tracks(seed: int, count: int, budget: float) -> None:
+    values, times = _random(seed, count)
+    budgets = budget * np.array([0.5, 2, 1.0, 0.7])
+    table, groups = table_of(values, times, np.inf), [np.array([1, 3]), np.array([2]), np.array([0])]
+    order = np.concatenate(groups)
+    (keep,) = segment_errors.shared_keys([(table, groups, budgets[order])])
+    for mask, group in zip(keep, groups, strict=True):
+        for track in group.tolist():
+            assert _missed(values[track], times, mask) <= budgets[track] * (1 + 1e-5)
+    np.testing.assert_array_equal(keep[1:], _keys(table, order[2:], budgets[order[2:]]))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 60))
+def test_each_key_reaches_as_far_as_all_shorter_lines_keep_the_budget(seed: int, count: int) -> None:
+    values, times = _random(seed, count, tracks=2)
+    tracks, budgets = np.array([1, 0]), np.array([2.0, 0.8])
+    reach = table_of(values, times, np.inf).reach(tracks, budgets)
+    for row, track, budget in zip(reach, tracks.tolist(), budgets.tolist(), strict=True):
+        for start in range(count - 1):
+            end = start + 1
+            while end + 1 < min(count, start + 1 + SPAN_RANGE[0]) and _is_within(
+                values[track, start : end + 2], times[start : end + 2], budget
+            ):
+                end += 1
+            assert row[start] == end or row[start] > start + SPAN_RANGE[0] - 2
+    assert (reach[:, -1] == count - 1).all()
+
+
+def _is_within(values: Floats, times: Floats, budget: float) -> bool:
+    return _missed(values, times, _chosen(len(values), ())) <= budget
