@@ -106,7 +106,7 @@ class Effort:
 GROUPS = ("wide groups", "groups")  # names in LAYOUTS
 FAST = Effort(5)
 BALANCED = Effort(
-    5, (0.25, 0.6), ("full",), 5, (0.0, 0.5), (1.1, 1.05), random_trials=20, coarsen_passes=2, groups=GROUPS
+    5, (0.25, 0.6), ("full",), 3, (0.0, 0.5), (1.1, 1.05), random_trials=25, coarsen_passes=2, groups=GROUPS
 )
 MAX = Effort(
     10,
