@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.model import Clip
+from anim.model import Clip, Interpolation
 from anim.skinning.analysis.extreme_vertices import reduce_scene
 from anim.skinning.bake import Baker, prepare_bake
 
 MAX_SEGMENTS = 50_000  # sampled on a few vertices
+MAX_SEGMENTS_PER_KEY_INTERVAL = 8  # between two keys motion is smooth, and so is its error
 MAX_INTERVALS = 4  # sampled on all vertices
 BLOCK_SEGMENTS = 512  # at once
 COARSE_PARTS = (0.25, 0.5, 0.75)  # of a segment: an eased motion has no error half-way, but elsewhere
@@ -59,9 +60,9 @@ class InbetweenMetric:
     def largest_error(self, clip: Clip, times: Floats) -> InbetweenError:
         """Return the largest inter-frame error found between frames at `times` (F,) s, increasing.
 
-        Segments between frames and keys are sampled in quarters, at keys and just before them, on the extreme vertices
-        of each joint; the intervals with the largest errors again in eighths, on all vertices. Elsewhere it may be
-        larger.
+        Segments between frames and keys, some of those between two keys, are sampled in quarters, at keys and before
+        those of STEP, on the extreme vertices of each joint; the intervals with the largest errors again in eighths, on
+        all vertices. Elsewhere it may be larger.
         """
         segments = _segments(clip, times)
         errors = _coarse_errors(self._reduced, clip, times, segments)
@@ -71,25 +72,39 @@ class InbetweenMetric:
 
 
 def _segments(clip: Clip, times: Floats) -> _Segments:
-    """All segments; of too many some that are evenly distributed."""
+    """All segments; of too many some that are evenly distributed, between two keys and in all."""
     keys = clip.key_times if clip.tracks else np.empty(0)
     inside = keys[(keys > times[0]) & (keys < times[-1])]
     knots = np.union1d(times, inside)
     frame = np.searchsorted(times, knots[:-1], side="right") - 1
-    segments = _Segments(knots[:-1], knots[1:], frame)
-    if len(frame) <= MAX_SEGMENTS:
-        return segments
-    return segments.select(np.linspace(0, len(frame) - 1, MAX_SEGMENTS).round().astype(int))
+    key_interval = np.searchsorted(inside, knots[:-1], side="right")
+    chosen = _spread(np.bincount(key_interval, minlength=len(inside) + 1))
+    if len(chosen) > MAX_SEGMENTS:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, MAX_SEGMENTS).round().astype(int)]
+    return _Segments(knots[:-1], knots[1:], frame).select(chosen)
+
+
+def _spread(counts: Ints) -> Ints:
+    """Indices of the first and the last segment of each key interval, and of others between, up to a number.
+
+    counts: (n,) segments in each, one or more.
+    """
+    count = np.repeat(counts, counts)
+    rank = np.arange(len(count)) - np.repeat(np.cumsum(counts) - counts, counts)
+    place = rank * (np.minimum(count, MAX_SEGMENTS_PER_KEY_INTERVAL) - 1) // np.maximum(count - 1, 1)
+    return np.flatnonzero((rank == 0) | (np.diff(place, prepend=-1) > 0))
 
 
 def _coarse_errors(reduced: Baker, clip: Clip, times: Floats, segments: _Segments) -> Floats:
     """The largest error (n,) m of a few vertices in each segment."""
     found = np.zeros(len(segments.frame))
+    has_jumps = any(track.interpolation is Interpolation.STEP for track in clip.tracks)
+    parts = (0.0, *COARSE_PARTS, 1.0) if has_jumps else (0.0, *COARSE_PARTS)
     for first in range(0, len(found), BLOCK_SEGMENTS):
         block = slice(first, first + BLOCK_SEGMENTS)
         here = segments.select(block)
         before, after = times[here.frame], times[here.frame + 1]
-        samples = [here.at(part) for part in (0.0, *COARSE_PARTS, 1.0)]
+        samples = [here.at(part) for part in parts]
         seconds = np.unique(np.concatenate((before, after, *samples)))
         frames = reduced.bake(clip, times=seconds).load_all().positions
         low, high = frames[np.searchsorted(seconds, before)], frames[np.searchsorted(seconds, after)]

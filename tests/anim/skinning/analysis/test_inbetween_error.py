@@ -69,6 +69,14 @@ def test_frames_at_a_rate_miss_the_arc_between_two() -> None:
     assert inbetween_error(made, Clip("", ()), np.zeros(1)).distance == 0
 
 
+def test_a_key_between_two_of_many_frames_is_found() -> None:
+    """Of the thousands of frames between two keys only some are sampled."""
+    there_and_back = _turning([0, 5.2003, 5.2004, 5.2005, 9], [0, 0, 90, 0, 0])
+    found = inbetween_error(_rigid(), there_and_back, frame_times(0, 9, fps=1000))
+    assert found.time == pytest.approx(5.2004, abs=1e-5)
+    assert found.distance == pytest.approx(2 * np.sqrt(2), rel=1e-3)
+
+
 def test_the_widest_gaps_are_looked_into() -> None:
     """Many gaps, of which one is twice as wide; against every middle of the whole, as one bake."""
     of = random_scene(3)
