@@ -14,6 +14,7 @@ TABLE_FRACTIONS = tuple(10.0 ** (k / 4 - 6) for k in range(21))  # of the diagon
 TABLE_FACTOR = TABLE_FRACTIONS[1] / TABLE_FRACTIONS[0]
 FIRST_ENTRY, FIRST_STEP = 12, 4  # of the table: 1e-3 of the diagonal, and its neighbors a decade apart
 FIRST_FRACTION = TABLE_FRACTIONS[FIRST_ENTRY]
+MIN_SIZE_RATIO = 0.98  # of animation bytes at a smaller bound to those at a larger one; else they are not verifiable
 SIZE_MARGIN = 3e-3  # of the animation's bytes: sizes between two entries are estimates
 BOUND_STEP_FACTOR = 1.05  # between the bounds that a search may return
 BOUND_EXPONENT_PER_SIZE = 16.0  # a bound 17 % larger saves about a percent of the animation's bytes
@@ -61,7 +62,9 @@ def smallest_bound(
         return None
     table = _SizeTable(diagonal, sized)
     last = len(TABLE_FRACTIONS) - 1
-    first = _first_entry(lambda entry: table.size(entry, usual_ratio) <= max_bytes)
+    first = _first_entry(
+        lambda entry, larger: table.size(entry, usual_ratio) <= max_bytes and table.is_plausible(entry, larger)
+    )
     for entry in range(first, last + 1):
         bound = table.bound_before(entry, max_bytes, ratio(table.bound(entry)))
         if bound is not None:
@@ -110,6 +113,12 @@ class _SizeTable:
         point = self._point(entry)
         return point.size - (1 - ratio) * point.animation
 
+    def is_plausible(self, entry: int, larger: int) -> bool:
+        """Return whether an entry has as many bytes as a larger one; less come of a search that misses its bound."""
+        if larger not in self._found:
+            return True
+        return self._point(entry).animation >= MIN_SIZE_RATIO * self._point(larger).animation
+
     def bound_before(self, entry: int, max_bytes: int, ratio: float) -> float | None:
         """Return the bound, m, of `max_bytes` between an entry and the one before; None above the entry.
 
@@ -122,6 +131,8 @@ class _SizeTable:
         if not entry:
             return self.bound(entry)
         low = self._point(entry - 1)
+        if not self.is_plausible(entry - 1, entry):
+            return self.bound(entry)
         if ratio * low.animation <= limit:
             return self.bound(entry - 1)
         fraction = math.log(ratio * low.animation / limit) / math.log(low.animation / high.animation)
@@ -133,10 +144,11 @@ class _SizeTable:
         return self._found[entry]
 
 
-def _first_entry(fits: Callable[[int], bool]) -> int:
+def _first_entry(fits: Callable[[int, int], bool]) -> int:
     """Return the first entry of the table that fits, or its length; entries after one that fits count as fitting.
 
-    The order of entries depends on nothing but earlier answers: more that fit never lead to a later entry.
+    fits: of an entry, and the first one so far, or the table's length. The order of entries depends on nothing but
+    earlier answers, and each is asked for with the same one so far: more that fit never lead to a later entry.
     """
     count = len(TABLE_FRACTIONS)
     low, high = -1, count
@@ -149,7 +161,7 @@ def _first_entry(fits: Callable[[int], bool]) -> int:
             entry = min(low + FIRST_STEP, count - 1)
         else:
             entry = (low + high) // 2
-        if fits(entry):
+        if fits(entry, high):
             high = entry
         else:
             low = entry

@@ -85,6 +85,20 @@ def test_nothing_fits_too_few_bytes() -> None:
     assert ERROR_FRACTIONS[0] > MIN_BOUND_PER_DIAGONAL
 
 
+@pytest.mark.parametrize("ratio", [1.0, 0.98])
+def test_fewer_bytes_at_small_bounds_are_not_believed(ratio: float) -> None:
+    """A quick search without verification can miss bounds near what float32 stores, in fewer bytes."""
+
+    def missed(max_error: float) -> RatePoint:
+        size = 2000 if 0 < max_error < 5e-5 * DIAGONAL else _sized(max_error).size
+        return RatePoint(max_error, size, max_error, size)
+
+    limit = math.ceil(ratio * _sized(1.2e-4 * DIAGONAL).size)
+    found = smallest_bound(limit, DIAGONAL, missed, lambda _: ratio, usual_ratio=ratio)
+    assert found is not None
+    assert 1e-4 <= found / DIAGONAL <= 1.5e-4
+
+
 @pytest.mark.parametrize("usual_ratio", [1.0, 0.97])
 def test_more_bytes_never_give_a_larger_bound(usual_ratio: float) -> None:
     """Though sizes and ratios are noisy: by 9 %, far more than those of real files."""
