@@ -11,7 +11,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import KEYS_PER_PART, greedy_keys, joint_greedy_keys
 from anim.optimization.search import segment_errors
-from anim.optimization.search.axis_groups import AxisCosts, group_tracks
+from anim.optimization.search.axis_groups import Reaches, group_tracks
 from anim.optimization.search.axis_merging import SharedAxis, merge_axes
 from anim.optimization.search.plan import Groups
 from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, fits
@@ -83,11 +83,9 @@ class TimeAxisSearch:
         """Return whether there is a table for all of some tracks, and they are not too many for groups."""
         return self._is_groupable and len(self.grid) <= KEYS_PER_PART and bool(self._is_tabled[tracks].all())
 
-    def find_groups(self, keyed: Ints, budgets: Floats, key_bytes_factor: float) -> list[Ints]:
-        """Return the tracks in groups with an axis each."""
-        reach = self._table.reach(np.searchsorted(self._tabled, keyed), budgets[keyed])
-        costs = AxisCosts(self.coding.byte_costs.axis, self.coding.time_bytes, key_bytes_factor * self.key_bytes[keyed])
-        return [np.sort(keyed[each]) for each in group_tracks(reach, costs)]
+    def reaches(self, keyed: Ints, budgets: Floats) -> Reaches:
+        """Return what `group_tracks` takes for tracks, all of them in the table."""
+        return self._table.reach(np.searchsorted(self._tabled, keyed), budgets[keyed]), self.key_bytes[keyed]
 
     def table_of_groups(self, groups: Sequence[Ints], budgets: Floats) -> tuple[SegmentErrors, list[Ints], Floats]:
         """Return what `segment_errors.shared_keys` takes for groups of tracks."""
@@ -168,17 +166,33 @@ def _group_axes(asked: Sequence[Asked], key_bytes_factor: float = 1.0) -> list[l
         found[n] = axes
     tabled = [n for n, each in enumerate(asked) if n not in others]
     _tabulate([asked[n].layouts for n in tabled])
-    groups = [_groups(asked[n], key_bytes_factor) for n in tabled]
+    groups = _groups([asked[n] for n in tabled], key_bytes_factor)
     tables = [asked[n].layouts.table_of_groups(some, asked[n].budgets) for n, some in zip(tabled, groups, strict=True)]
     for n, some, keys in zip(tabled, groups, segment_errors.shared_keys(tables), strict=True):
         found[n] = [SharedAxis(mask, tuple(each.tolist())) for mask, each in zip(keys, some, strict=True)]
     return found
 
 
-def _groups(asked: Asked, key_bytes_factor: float) -> list[Ints]:
+def _groups(asked: Sequence[Asked], key_bytes_factor: float) -> list[list[Ints]]:
+    """The groups of each clip: those that were asked for, or else the best ones found."""
+    new = [each for each in asked if not each.groups]
+    found = iter(_find_groups(new, key_bytes_factor) if new else [])
+    return [_groups_asked_for(each) if each.groups else next(found) for each in asked]
+
+
+def _find_groups(asked: Sequence[Asked], key_bytes_factor: float) -> list[list[Ints]]:
+    coding = asked[0].layouts.coding
+    reaches = [layouts.reaches(keyed, budgets) for layouts, keyed, budgets, _ in asked]
+    groups = group_tracks(
+        [(reach, key_bytes_factor * key_bytes) for reach, key_bytes in reaches],
+        axis_bytes=coding.byte_costs.axis,
+        time_bytes=coding.time_bytes,
+    )
+    return [[np.sort(each.keyed[group]) for group in some] for each, some in zip(asked, groups, strict=True)]
+
+
+def _groups_asked_for(asked: Asked) -> list[Ints]:
     """The groups that were asked for, of keyed tracks, and a group for each further track."""
-    if not asked.groups:
-        return asked.layouts.find_groups(asked.keyed, asked.budgets, key_bytes_factor)
     keyed = set(asked.keyed.tolist())
     groups = [np.array([i for i in each if i in keyed], np.int64) for each in asked.groups]
     further = keyed.difference(*asked.groups)
