@@ -105,9 +105,7 @@ class Effort:
 
 GROUPS = ("wide groups", "groups")  # names in LAYOUTS
 FAST = Effort(5)
-BALANCED = Effort(
-    5, (0.25, 0.6), ("full",), 3, (0.0, 0.5), (1.1, 1.05), random_trials=25, coarsen_passes=2, groups=GROUPS
-)
+BALANCED = Effort(5, (0.4,), (), 3, (0.0, 0.5), (1.1, 1.05), random_trials=20, coarsen_passes=2, groups=GROUPS)
 MAX = Effort(
     10,
     (0.1, 0.25, 0.4, 0.6, 0.8),

@@ -29,6 +29,7 @@ INT16_COARSENING = 1e3  # factor on the storage tolerance that selects integers
 SEED = 2026
 LOG_DEVIATIONS = (0.25, 0.05)  # of random changes, in natural logarithms: initial and minimum
 CHANGED_TRACK_FRACTION = 0.3  # of tracks, per random change
+REGROUPED_FRACTION = 0.2  # of random changes, for which new groups of tracks are found
 MIN_SHRINK = 1e-6  # of the initial budget; below it the storage is the limit
 
 
@@ -189,7 +190,15 @@ class _Search:
         for factor in self._effort.finishing:
             yield from self._attempt(replace(plan, budgets=plan.budgets * factor))
         yield from self._store_coarser()
+        yield from self._regroup()
         yield from self._random_trials(self._effort.random_trials)
+        yield from self._regroup()
+
+    def _regroup(self) -> Step:
+        """Try new groups of tracks under the best result's budgets."""
+        assert self._best is not None
+        for name in self._effort.groups:
+            yield from self._attempt(replace(self._best.plan, axes=name, groups=()))
 
     def _coarsen_each(self) -> Step:
         """Try coarser storage, track by track."""
@@ -238,13 +247,16 @@ class _Search:
         if not count:
             return  # numpy's random numbers are not imported
         chance = np.random.default_rng(SEED)
-        spread = LOG_DEVIATIONS[0]
+        spread, names = LOG_DEVIATIONS[0], self._effort.groups
         for _ in range(count):
             best = self._best
             assert best is not None
             tracks = len(best.plan.budgets)
             changes = spread * chance.standard_normal(tracks) * (chance.random(tracks) < CHANGED_TRACK_FRACTION)
-            yield from self._attempt(replace(best.plan, budgets=best.plan.budgets * np.exp(changes)))
+            plan = replace(best.plan, budgets=best.plan.budgets * np.exp(changes))
+            if plan.groups and chance.random() < REGROUPED_FRACTION:
+                plan = replace(plan, axes=names[int(chance.integers(len(names)))], groups=())
+            yield from self._attempt(plan)
             spread = spread * 1.3 if self._best is not best else max(0.96 * spread, LOG_DEVIATIONS[1])
 
 
