@@ -11,8 +11,10 @@ import pytest
 from anim.errors import FormatError
 from anim.model import FrameChunk
 from cli.reports import json_report
+from fixtures.broken.pieces import buffered, text
 from tests.cli.conftest import Call, Find
 from tests.cli.running import built, refusal
+from tests.files import opened_path
 
 CACHES = ("npz", "pc2", "mdd", "ply", "obj", "stl", "png", "exr", "glb", "usda")
 
@@ -62,12 +64,40 @@ def test_the_first_number_that_json_cannot_hold_is_named() -> None:
         json_report.dump({"clips": [{"error": 1.0}, {"error": float("nan")}]})
 
 
+@pytest.mark.parametrize("ending", ["pc2", "mdd", "npz", "png", "glb"])
 @pytest.mark.parametrize("line", ["v 0 0 1e300", "v nan 0 1"])
-def test_a_mesh_beyond_float32_is_refused(line: str, call: Call, tmp_path: Path) -> None:
+def test_a_mesh_beyond_float32_is_refused(line: str, ending: str, call: Call, tmp_path: Path) -> None:
     path = tmp_path / "a.obj"
     path.write_text(f"{line}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    refusal(call("convert-cache", path, tmp_path / "out.pc2"), 3)
+    refusal(call("convert-cache", path, tmp_path / f"out.{ending}"), 3)
     assert list(tmp_path.iterdir()) == [path]
+
+
+WEIGHTS = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+
+
+def of_morph_targets(largest: float) -> bytes:
+    """A triangle of two targets, which move a vertex by `largest`, the first alone and then both."""
+    moves = largest * np.array([[1, -1, 1], [0, 0, 0], [0, 0, 0]])
+    arrays = buffered(
+        ("SCALAR", 5126, [0, 1]), ("SCALAR", 5126, [1, 0, 1, 1]), ("VEC3", 5126, np.eye(3)), ("VEC3", 5126, moves)
+    )
+    meshes = [{"primitives": [{"attributes": {"POSITION": 2}, "targets": [{"POSITION": 3}] * 2}]}]
+    clip = {"samplers": [{"input": 0, "output": 1}], "channels": [WEIGHTS]}
+    return text({"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "meshes": meshes, "animations": [clip], **arrays})
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+def test_morph_targets_near_the_end_of_float32_write_numbers_or_nothing(
+    ending: str, call: Call, tmp_path: Path
+) -> None:
+    path, out = tmp_path / "a.gltf", tmp_path / f"out.{ending}"
+    path.write_bytes(of_morph_targets(3e38))
+    assert "is beyond float32" in refusal(call("bake", path, out, "--rigid", "--fps", "4"), 3)
+    assert list(tmp_path.iterdir()) == [path]
+    path.write_bytes(of_morph_targets(1e38))
+    call("bake", path, out, "--rigid", "--fps", "4").product()
+    json.dumps(opened_path(out).json, allow_nan=False)
 
 
 @pytest.mark.parametrize("ending", ["pc2", "npz"])
