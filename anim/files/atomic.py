@@ -8,6 +8,7 @@ set.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 import time
@@ -20,6 +21,7 @@ from typing import BinaryIO
 from anim.arrays import Bytes
 from anim.errors import OutputError, not_written
 from anim.files import resolver, signals
+from anim.files.stream import write_stream
 
 MAX_PREFIX_LENGTH = 40  # characters of the target name in a temporary name, so that long names remain valid
 BLOCK_BYTES = 1 << 24  # copied or compared at a time
@@ -30,7 +32,8 @@ LOCK_POLL_S = 0.005
 def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
     """Write one file atomically; for equal bytes only the modification time is updated.
 
-    Links are followed; special files (/dev/null, a named pipe) are written directly. Raises OutputError.
+    Links are followed; special files (/dev/null, a named pipe) are written directly, and so is what this process has
+    open (/dev/stdout, also where it leads to a file): after what others wrote there. Raises OutputError.
     """
     with commit_after(path, pieces):
         pass
@@ -47,7 +50,10 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     with temporary_files() as made:
         with name_errors(path):
             check_writable(path)
-            if target.exists() and not target.is_file():
+            if (number := descriptor_of(path)) is not None:
+                with os.fdopen(os.dup(number), "wb", buffering=0) as stream:
+                    write_stream(stream, (piece.data for piece in pieces), str(path))
+            elif target.exists() and not target.is_file():
                 with target.open("wb") as file:
                     file.writelines(piece.data for piece in pieces)
             elif not has_bytes(target, pieces):
@@ -56,8 +62,16 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
         with name_errors(path):
             if temporary is not None:
                 os.replace(temporary, target)
-            elif target.is_file():
+            elif target.is_file() and number is None:
                 os.utime(target)
+
+
+def descriptor_of(path: Path) -> int | None:
+    """Return the number of the open file that a path names: 1 of /dev/stdout, 3 of /dev/fd/3; None for other paths."""
+    found = re.fullmatch(r"/dev/(?:(stdout)|(stderr)|fd/(\d{1,9}))|/proc/self/fd/(\d{1,9})", str(path))
+    if found is None:
+        return None
+    return 1 if found[1] else 2 if found[2] else int(found[3] or found[4])
 
 
 @dataclass

@@ -10,7 +10,18 @@ from pathlib import PurePath
 from cli.errors import UsageError
 
 FORBIDDEN = frozenset('/\\:*?"<>|')  # invalid in names on some file systems
-RESERVED = frozenset(("con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))))
+# Devices of Windows, which takes the superscripts of Latin-1 for digits
+RESERVED = frozenset(
+    (
+        "con",
+        "conin$",
+        "conout$",
+        "prn",
+        "aux",
+        "nul",
+        *(f"{port}{i}" for port in ("com", "lpt") for i in "0123456789¹²³"),
+    )
+)
 MAX_NAME_BYTES = 100  # of 255 in most file systems: the pattern may have several, and words around them
 OF_PATHS = ("path", "folder", "name", "stem")  # of names that follow from an input's
 _is_plain = re.compile(r"[A-Za-z0-9_-]*").fullmatch  # most names, of which nothing is replaced

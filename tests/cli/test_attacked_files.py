@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from anim.files import atomic
 from fixtures.broken.pieces import animated, buffered, text
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal, shell
@@ -184,6 +186,68 @@ def test_a_buffer_of_another_file_is_not_overwritten(call: Call, tmp_path: Path)
     assert call("inspect", tmp_path / "b.gltf").code == 0
 
 
+@pytest.mark.parametrize(
+    "line", ["convert in.glb out.glb", "resample in.glb out.glb --fps 4", "convert-cache in.npz out.pc2"]
+)
+def test_an_input_that_is_cut_short_while_it_is_copied(
+    line: str, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A document was read whole before; a cache, which is read by frames, is refused as the input's fault."""
+    monkeypatch.chdir(tmp_path)
+    Path("in.glb").write_bytes(built("arm"))
+    call("bake", "in.glb", "in.npz", "--clip", "bend", "--fps", "4").product()
+    call(*line.replace(" out.", " whole.").split()).product()
+    name, out = (word for word in line.split() if "." in word)
+    create = atomic.create_temporary
+
+    def cut(*arguments: Any) -> tuple[int, Path]:
+        os.truncate(name, 500)
+        return create(*arguments)
+
+    monkeypatch.setattr(atomic, "create_temporary", cut)
+    run = call(*line.split())
+    if name == "in.npz":
+        assert "in.npz: " in refusal(run, 3)
+        assert not Path(out).exists()
+    else:
+        run.product()
+        assert Path(out).read_bytes() == Path(f"whole{Path(out).suffix}").read_bytes()
+
+
+TIMES = {
+    "down": [1, 0],
+    "equal": [1, 1],
+    "negative": [-1, 0],
+    "NaN": [0, np.nan],
+    "infinite": [0, np.inf],
+    "none": None,
+}
+
+
+@pytest.mark.parametrize("times", TIMES)
+@pytest.mark.parametrize(
+    "line", ["convert-cache in.npz out.pc2", "convert-cache in.npz o.npz --fps 9", "diff in.npz in.npz"]
+)
+def test_times_of_an_npz_are_its_own_fault(
+    times: str, line: str, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arrays: dict[str, Any] = {"positions": np.zeros((2, 3, 3), np.float32), "faces": np.array([[0, 1, 2]])}
+    np.savez("in.npz", **arrays if TIMES[times] is None else {**arrays, "times": np.array(TIMES[times], float)})
+    assert "times" in refusal(call(*line.split()), 3)
+
+
+@pytest.mark.parametrize("times", TIMES)
+def test_times_of_a_texture_are_its_own_fault(times: str, call: Call, tmp_path: Path) -> None:
+    (tmp_path / "arm.glb").write_bytes(built("arm"))
+    call("bake", tmp_path / "arm.glb", tmp_path / "a.png", "--clip", "bend", "--fps", "1").product()
+    about = json.loads((tmp_path / "a.png.json").read_text())
+    assert len(about["times_s"]) == 2
+    (tmp_path / "a.png.json").write_text(json.dumps({**about, "times_s": TIMES[times]}))
+    refusal(call("convert-cache", tmp_path / "a.png", tmp_path / "out.npz"), 3)
+    assert not (tmp_path / "out.npz").exists()
+
+
 @pytest.mark.parametrize("way", ["> out", ">> out", "| cat > out"])
 def test_stdout_by_its_path_takes_what_stdout_takes(way: str, tmp_path: Path) -> None:
     """What is there before stays; a file is no pipe, and is not replaced."""
@@ -191,6 +255,29 @@ def test_stdout_by_its_path_takes_what_stdout_takes(way: str, tmp_path: Path) ->
     shell(f"(echo hi; gltf-anim convert in.glb /dev/stdout -q) {way}", tmp_path).product()
     shell("gltf-anim convert in.glb - -q > plain", tmp_path).product()
     assert (tmp_path / "out").read_bytes() == b"hi\n" + (tmp_path / "plain").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("line", "place"),
+    [
+        ("sample in.glb OUT --at 0 -q", "/proc/self/fd/1"),
+        ("plot --ease quad-in OUT --format svg -q", "/dev/stdout"),
+        ("optimize in.glb o.glb --effort fast -q --report OUT", "/dev/fd/1"),
+        ("check in.glb --write-baseline OUT", "/dev/stdout"),
+        ("convert in.glb OUT -q", "/dev/fd/3"),
+    ],
+)
+def test_what_is_open_already_is_written_after_what_is_there(line: str, place: str, tmp_path: Path) -> None:
+    (tmp_path / "in.glb").write_bytes(built("arm"))
+    alone = "gltf-anim " + line.replace("OUT", "alone.glb" if place.endswith("3") else "alone")
+    expected = shell(f"{alone} >&2 && cat alone*", tmp_path).product()
+    command = "gltf-anim " + line.replace("OUT", place)
+    done = shell(f"(echo hi; {command}; echo bye) > out 3>&1", tmp_path)
+    assert done.code == 0, done.err
+    found = (tmp_path / "out").read_bytes()
+    assert (found[:3], found[-4:]) == (b"hi\n", b"bye\n")
+    if "--report" not in line:  # which tells the time
+        assert found[3:-4] == expected
 
 
 def test_a_compressed_view_without_its_object_is_refused(call: Call, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Files of many nodes, joints and meshes, through commands whose work once grew with their square."""
+"""Files of many nodes, joints, meshes and empty clips, through commands whose work once grew with their square."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests import many
 from tests.cli.conftest import Call
 from tests.cli.test_many import LIMIT, work
 
-CALLS_PER_NODE = [  # once twice as many, with an object per node and step
+CALLS_PER_ITEM = [  # once twice as many, with an object per node and step
     (many.chain_bare, 3000, "resample --fps 5 OUT", 70),
     (many.chain_bare, 3000, "optimize --jobs 1 OUT", 100),
     (many.chain_bare, 3000, "inspect", 80),
@@ -22,6 +22,10 @@ CALLS_PER_NODE = [  # once twice as many, with an object per node and step
     (many.chain_bare, 3000, "check", 85),
     (many.chain_bare, 3000, "diff IN", 170),
     (many.chain_bare, 3000, "loop OUT --blend 0.1", 100),
+    *((many.side, 1500, line, 100) for line in ("resample --fps 5 OUT", "optimize --jobs 1 OUT", "diff IN")),
+    (many.side, 1500, "to-euler BVH", 250),
+    *((many.clips_empty, 900, line, 110) for line in ("resample --fps 5 OUT", "inspect")),
+    *((many.clips_empty, 900, line, 190) for line in ("optimize --jobs 1 OUT", "diff IN")),
 ]
 CASES = [
     (many.joints, 500, "inspect"),  # ancestors of every joint, twice: 2 GB of sets for 8000
@@ -37,11 +41,13 @@ def test_work_grows_with_the_count(make: many.Make, count: int, command: str, ca
     assert taken[1] < LIMIT * taken[0]
 
 
-@pytest.mark.parametrize(("make", "count", "line", "limit"), CALLS_PER_NODE, ids=lambda each: str(each).split()[0])
-def test_a_node_takes_few_calls(make: many.Make, count: int, line: str, limit: int, call: Call, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("make", "count", "line", "limit"), CALLS_PER_ITEM, ids=lambda each: str(each).split()[0])
+def test_a_node_or_clip_takes_few_calls(
+    make: many.Make, count: int, line: str, limit: int, call: Call, tmp_path: Path
+) -> None:
     path = tmp_path / "in.glb"
     path.write_bytes(make(count))
-    names = {"OUT": tmp_path / "out.glb", "IN": path}
+    names = {"OUT": tmp_path / "out.glb", "BVH": tmp_path / "out.bvh", "IN": path}
     command, *options = line.split()
     assert work(call, command, path, *(names.get(each, each) for each in options)) < limit * count
 

@@ -171,6 +171,8 @@ def test_a_file_of_a_later_version_is_refused(version: str, asset: Find, call: C
         ("com1", "_com1.npz"),
         ("nul.txt", "_nul.txt.npz"),
         ("lpt9 ", "_lpt9.npz"),
+        ("COM¹", "_COM¹.npz"),
+        ("conout$", "_conout$.npz"),
         ("console", "console.npz"),
         ("a" * 300, f"{'a' * 100}.npz"),
         ("ä" * 300, f"{'ä' * 50}.npz"),

@@ -23,6 +23,15 @@ def test_names_are_told_apart() -> None:
     assert expand("{mesh}-{clip}.npz", [{"mesh": "{clip}", "clip": "a"}], [0]) == ["{clip}-a.npz"]
 
 
+def test_names_of_many_clips_are_told_apart_at_once() -> None:
+    """It takes half a minute to compare each name with all before it."""
+    count = 50_000
+    clips = [{"clip": f"c{i // 2}"} for i in range(count)]
+    names = expand("{clip}.npz", clips, range(count))
+    assert names[:3] == ["c0.npz", "c0-1.npz", "c1.npz"]
+    assert len(set(names)) == count
+
+
 @pytest.mark.parametrize(
     "line",
     [
