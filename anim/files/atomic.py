@@ -99,7 +99,8 @@ class AtomicOutputs:
         path = self.folder / name
         if path.exists() and not path.is_file():  # companions of /dev/null would be in a shared folder
             path = Path(tempfile.gettempdir()) / name
-        handle, self.files[name] = create_temporary(path)
+        with signals.hold_signals():  # one in between would leave a file that nobody knows
+            handle, self.files[name] = create_temporary(path)
         return os.fdopen(handle, "w+b")
 
     def commit(self) -> None:
@@ -185,8 +186,9 @@ def write_temporary(path: Path, pieces: Iterable[Bytes], made: list[Path]) -> Pa
 
     made: of `temporary_files`; receives the path on creation.
     """
-    handle, temporary = create_temporary(path)
-    made.append(temporary)
+    with signals.hold_signals():  # one in between would leave a file that nobody knows
+        handle, temporary = create_temporary(path)
+        made.append(temporary)
     with os.fdopen(handle, "wb") as file:
         file.writelines(piece.data for piece in pieces)
     copy_permissions(path, temporary)

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import signal
+import tempfile
 import threading
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from anim.files import atomic
 from anim.files.signals import hold_signals
 
 
@@ -23,6 +28,25 @@ def test_an_interrupt_takes_effect_at_the_end() -> None:
         work()
     assert done
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == usual
+
+
+def test_a_signal_as_a_temporary_file_is_made_does_not_leave_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def mkstemp(**options: Any) -> tuple[int, str]:
+        found = make(**options)
+        signal.raise_signal(signal.SIGINT)
+        return found
+
+    make = tempfile.mkstemp
+    monkeypatch.setattr(tempfile, "mkstemp", mkstemp)
+    with pytest.raises(KeyboardInterrupt):
+        atomic.write_file(tmp_path / "a.glb", [np.zeros(9, np.uint8)])
+    staged = atomic.AtomicOutputs(tmp_path, "a.npz")
+    with pytest.raises(KeyboardInterrupt):
+        staged.create("a.npz")
+    staged.clear()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_other_threads_hold_nothing() -> None:
