@@ -47,16 +47,19 @@ def is_compiled() -> bool:
 
 @cache
 def _has_cache() -> bool:
-    """Return whether the cache folder can be written; without it kernels are compiled in each process.
+    """Return whether there is a cache folder of this user alone; without it kernels are compiled in each process.
 
-    Numba would fall back to `__pycache__` beside the kernels, which machine code of other sources may be in.
+    Numba would fall back to `__pycache__` beside the kernels, which machine code of other sources may be in. It runs
+    what it finds in the folder: nobody else may have put it there.
     """
     folder = numba.config.CACHE_DIR
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = os.stat(folder)
     except OSError:
         return False
-    return bool(folder) and os.access(folder, os.W_OK)
+    is_ours = os.name != "posix" or (found.st_uid == os.geteuid() and not found.st_mode & 0o022)
+    return bool(folder) and is_ours and os.access(folder, os.W_OK)
 
 
 def _cache_folder() -> str:

@@ -8,10 +8,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 from anim import __version__
+from anim.skinning.kernels import jit
 from anim.skinning.kernels.dual_quaternion import skin_dual_quaternion
 from anim.skinning.kernels.layout import LANES, Influences, ScaleShear, group_influences
 from anim.skinning.kernels.vertex_normals import vertex_normals
@@ -93,6 +95,19 @@ def test_without_a_cache_folder_it_works_all_the_same(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_bytes(b"")
     assert _run(blocked) == _run(tmp_path / "other")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="has no such modes")
+@pytest.mark.parametrize(("mode", "is_used"), [(0o700, True), (0o755, True), (0o775, False), (0o1777, False)])
+def test_code_that_others_may_have_put_there_is_not_run(
+    mode: int, is_used: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    tmp_path.chmod(mode)
+    assert jit._has_cache.__wrapped__() is is_used
+    if os.geteuid() == 0:  # only root gives folders to others
+        os.chown(tmp_path, 1234, 1234)
+        assert not jit._has_cache.__wrapped__()
 
 
 def _run(cache: Path) -> str:
