@@ -134,5 +134,7 @@ def test_young_packages_have_upper_bounds() -> None:
 
 def test_ci_runs_the_lowest_and_the_newest_and_audits() -> None:
     text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
-    for words in ("--resolution lowest-direct", "--resolution highest", "pip-audit"):
+    for words in ("--resolution lowest-direct", "--resolution highest"):
         assert words in text
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    assert f"'.[{','.join(each for each in extras if each != 'test')}]' pip-audit" in text
