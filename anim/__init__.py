@@ -45,8 +45,8 @@ Metres, seconds and radians; right-handed, Y up; quaternions (x, y, z, w). Array
 shared: `values.copy()` gives one to write to.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING
+# No imports here: until the command has set its handlers of signals, Ctrl-C shows where Python was.
+TYPE_CHECKING = False  # type checkers take it for true
 
 if TYPE_CHECKING:
     from anim import ops as ops
@@ -107,6 +107,8 @@ __all__ = [*_HOMES, "ops"]
 
 
 def __getattr__(name: str) -> object:
+    from importlib import import_module
+
     if name == "ops":
         return import_module("anim.ops")
     if name not in _HOMES:

@@ -28,6 +28,11 @@ def test_a_signal_during_imports_ends_silently(where: str, number: signal.Signal
     assert (run.returncode, run.stdout, run.stderr) == (-number, b"", b"")
 
 
+def test_the_library_is_imported_before_the_handlers_are_set_and_imports_nothing() -> None:
+    run = python("import sys; before = set(sys.modules); import anim; print(*sorted(set(sys.modules) - before))")
+    assert run.stdout.split() == [b"anim"]
+
+
 @pytest.mark.parametrize(("number", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 @pytest.mark.parametrize("fate", ["turned into another error", "swallowed", "lost before an error", "passed on"])
 def test_a_signal_ends_the_run_whatever_a_package_makes_of_it(fate: str, number: str, code: int) -> None:
