@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError, RangeError
 from anim.model import Clip, Interpolation, Scene
 from anim.model.skeleton import ancestors
-from anim.sampling.sample import sample
+from anim.simulation.particles.node_motion import NodeMotion
 from anim.skinning.bake import bake
 
 VELOCITY_STEP_S = 1e-3  # half the interval of the difference quotient of an emitter's motion
@@ -136,9 +136,7 @@ def _at_node(
     """World positions, unit directions and velocities (n, 3) of a node at times (n,)."""
     at = np.maximum(times[:, None] + np.array([-VELOCITY_STEP_S, 0.0, VELOCITY_STEP_S]), clip.start)
     unique, inverse = np.unique(at, return_inverse=True)
-    world = sample(scene.skeleton, clip, unique, space="world").world
-    assert world is not None
-    matrices = world[:, node][inverse.reshape(at.shape)]
+    matrices = NodeMotion(scene.skeleton, clip).at(unique, [node])[:, 0][inverse.reshape(at.shape)]
     axes = matrices[:, 1, :, :3] @ (np.asarray(direction) / np.linalg.norm(direction))
     positions = matrices[:, :, :, 3]
     moving = frozenset(ancestors(scene.skeleton.parents, node)) | {node}
