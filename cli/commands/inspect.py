@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -28,6 +28,7 @@ from cli.text import Reporter
 from cli.workflows import checked_files
 
 SCHEMA = 1
+CLIP_KEYS = [each.name for each in fields(ClipReport) if each.name != "track_list"]
 
 
 class Format(StrEnum):
@@ -215,6 +216,6 @@ def _plain(inspected: Inspected) -> dict[str, Any]:
 
 
 def _plain_clip(report: ClipReport) -> dict[str, Any]:
-    values = asdict(report)
-    listed = [track._asdict() for track in values.pop("track_list")]
+    values = {key: getattr(report, key) for key in CLIP_KEYS}
+    listed = [track._asdict() for track in report.track_list]
     return {**values, "track_list": listed} if listed else values

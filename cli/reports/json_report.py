@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Iterator
@@ -11,11 +12,17 @@ from anim.errors import FormatError
 
 def dump(content: object, *, indent: int | None = 1) -> str:
     """Return a report as a JSON document that ends with a line break. Raises FormatError for NaN and infinity."""
+    text = io.StringIO()
     try:
-        return json.dumps(content, allow_nan=False, ensure_ascii=indent is None, indent=indent) + "\n"
+        if indent is None:
+            text.write(json.dumps(content, allow_nan=False))
+        else:  # piece by piece: a list of all pieces takes several times the memory of the text
+            json.dump(content, text, allow_nan=False, ensure_ascii=False, indent=indent)
     except ValueError:
         check_finite(content)
         raise
+    text.write("\n")
+    return text.getvalue()
 
 
 def check_finite(content: object) -> None:
