@@ -145,8 +145,9 @@ class CheckedFile:
 
     @cached_property
     def clips(self) -> list[tuple[ClipReport, Clip]]:
-        """The chosen, readable clips with their reports."""
-        return [(report, self.contents.clips[report.index]) for report in self.facts.clips]
+        """The chosen, readable clips that have tracks, with their reports."""
+        clips = [(report, self.contents.clips[report.index]) for report in self.facts.clips]
+        return [each for each in clips if each[1].tracks]
 
     def in_clip(
         self,

@@ -17,7 +17,8 @@ CYCLE = r"(?i)(^|[^a-z])(idle|walk|run|jog|sprint|crawl|swim|fly)(ing)?([^a-z]|$
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips. Without a pattern, and for other players than Godot, there are none."""
     pattern = parameters.texts["pattern"]
-    for report, clip in file.clips:
+    for report in file.facts.clips:
+        clip = file.contents.clips[report.index]
         if pattern and not re.search(pattern, clip.name):
             yield file.in_clip(report.index, problem=f"its name does not match {pattern}")
         if parameters.target == "godot" and clip.end > clip.start:
