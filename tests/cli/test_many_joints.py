@@ -37,3 +37,10 @@ def test_matrices_of_many_joints_are_multiplied_in_blocks(
         call("bake", tmp_path / "in.gltf", path, "--fps", "4").product()
         made.append(np.load(path)["positions"])
     np.testing.assert_array_equal(*made)
+
+
+def test_the_bind_pose_of_a_joint_is_found_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "in.gltf").write_bytes(of_joints(1000))
+    counted = count_calls(monkeypatch, matrix, "multiply")
+    call("to-euler", tmp_path / "in.gltf", tmp_path / "out.bvh").product()
+    assert len(counted) < 50

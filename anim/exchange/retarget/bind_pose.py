@@ -62,7 +62,9 @@ def _bind_matrices(
     skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]
 ) -> dict[int, Floats]:
     """World bind matrices (3, 4) by joint of a skin."""
-    joints, inverse = held[1].joints, held[1].inverse_bind
+    last = {node: j for j, node in enumerate(held[1].joints.tolist())}  # a file may name a joint many times
+    named = list(last.values())
+    joints, inverse = held[1].joints[named], held[1].inverse_bind[named]
     in_mesh = matrix.inverse(inverse)
     moves = matrix.multiply(world[joints], inverse)
     volumes = np.abs(np.linalg.det(moves[:, :, :3]))
