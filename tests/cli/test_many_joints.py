@@ -44,3 +44,11 @@ def test_the_bind_pose_of_a_joint_is_found_once(call: Call, tmp_path: Path, monk
     counted = count_calls(monkeypatch, matrix, "multiply")
     call("to-euler", tmp_path / "in.gltf", tmp_path / "out.bvh").product()
     assert len(counted) < 50
+
+
+def test_inverse_binds_for_usd_are_checked_at_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pxr", reason="usd-core is not installed")
+    (tmp_path / "in.gltf").write_bytes(of_joints(1000))
+    counted = count_calls(monkeypatch, np.linalg, "svd")
+    call("convert", tmp_path / "in.gltf", tmp_path / "out.usda").product()
+    assert 0 < len(counted) < 50

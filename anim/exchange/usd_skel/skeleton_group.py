@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.errors import UnsupportedError
 from anim.model import MeshInstance, Scene, Skin
 from anim.model.skeleton import ancestors
@@ -62,6 +62,7 @@ def group_skeletons(
     prims. animated: nodes that a clip moves; those above joints become joints.
     Raises UnsupportedError for a joint with weight whose inverse bind matrix has no inverse.
     """
+    rest = rest_world(scene.skeleton)
     groups: list[SkeletonGroup] = []
     morphed: list[SkeletonGroup] = []
     for instance in instances:
@@ -69,7 +70,7 @@ def group_skeletons(
             if len(instance.mesh.targets):
                 morphed.append(SkeletonGroup(instance.node, members=[(instance, np.eye(4))]))
             continue
-        binds = _inverse_binds(instance, instance.skin, scene)
+        binds = _inverse_binds(instance, instance.skin, scene, rest)
         for group in groups:
             matrix = _matrix_into(group, binds, instance.mesh.positions)
             if matrix is not None:
@@ -84,45 +85,58 @@ def group_skeletons(
         group.members.append((instance, matrix))
     for instance in instances:
         if instance.skin is None and not len(instance.mesh.targets):
-            _add_attached(groups, instance, scene)
+            _add_attached(groups, instance, scene, rest)
     for group in groups:
         _join_hierarchy(group, scene, animated)
     return groups + morphed
 
 
-def _add_attached(groups: Sequence[SkeletonGroup], instance: MeshInstance, scene: Scene) -> None:
+def _add_attached(groups: Sequence[SkeletonGroup], instance: MeshInstance, scene: Scene, rest: Floats) -> None:
     """Add an unskinned instance to the skeleton with a joint above it, its node being a joint."""
     above = list(ancestors(scene.skeleton.parents, instance.node))
     for group in groups:
         if any(node in group.inverse_bind for node in above):
-            world = np.vstack((rest_world(scene.skeleton)[instance.node], (0, 0, 0, 1)))
-            if _is_invertible(world):
+            world = _homogeneous(rest[instance.node])
+            if _are_invertible(world):
                 bind = group.inverse_bind.setdefault(instance.node, np.asarray(np.linalg.inv(world), np.float64))
                 group.members.append((instance, np.asarray(np.linalg.inv(bind), np.float64)))
             return
 
 
-def _inverse_binds(instance: MeshInstance, skin: Skin, scene: Scene) -> dict[int, Floats]:
-    """joint_from_mesh (4, 4) by node; of joints without weight, those without an inverse are replaced by the rest."""
-    used = set(np.unique(instance.mesh.joints[instance.mesh.weights > 0]).tolist())
-    found, rest = dict[int, Floats](), rest_world(scene.skeleton)
+def _inverse_binds(instance: MeshInstance, skin: Skin, scene: Scene, rest: Floats) -> dict[int, Floats]:
+    """joint_from_mesh (4, 4) by node; of joints without weight, those without an inverse are replaced by the rest.
+
+    rest: (N, 3, 4), world matrices. Of a node that is a joint several times the first matrix counts.
+    """
+    used = np.unique(instance.mesh.joints[instance.mesh.weights > 0])
+    lost = used[~_are_invertible(skin.inverse_bind[used])]
+    if len(lost):
+        raise UnsupportedError(
+            f"the inverse bind matrix of {scene.skeleton.label(int(skin.joints[lost[0]]))} has no inverse, "
+            "which USD needs",
+            help="optimize and check keep such skins; bake to .usdz has their vertices",
+        )
+    first: dict[int, int] = {}
     for i, node in enumerate(skin.joints.tolist()):
-        matrix = np.vstack((skin.inverse_bind[i], (0, 0, 0, 1)))
-        if not _is_invertible(matrix):
-            if i in used:
-                raise UnsupportedError(
-                    f"the inverse bind matrix of {scene.skeleton.label(node)} has no inverse, which USD needs",
-                    help="optimize and check keep such skins; bake to .usdz has their vertices",
-                )
-            matrix = np.vstack((rest[node], (0, 0, 0, 1)))
-            matrix = np.linalg.inv(matrix) if _is_invertible(matrix) else np.eye(4)
-        found.setdefault(node, matrix)
+        first.setdefault(node, i)
+    inverse = skin.inverse_bind[[*first.values()]]
+    found: dict[int, Floats] = {}
+    for node, matrix, is_sound in zip(first, inverse, _are_invertible(inverse).tolist(), strict=True):
+        found[node] = _homogeneous(matrix if is_sound else rest[node])
+        if not is_sound:
+            found[node] = np.linalg.inv(found[node]) if _are_invertible(found[node]) else np.eye(4)
     return found
 
 
-def _is_invertible(matrix: Floats) -> bool:
-    singular = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    return bool(np.isfinite(matrix).all() and singular[-1] > 1e-9 * singular[0])
+def _homogeneous(matrix: Floats) -> Floats:
+    """The affine matrix (3, 4) as (4, 4)."""
+    return np.vstack((matrix, (0, 0, 0, 1)))
+
+
+def _are_invertible(matrices: Floats) -> Bools:
+    """Whether affine matrices (..., 3 or 4, 4) have an inverse."""
+    singular = np.linalg.svd(matrices[..., :3, :3], compute_uv=False)
+    return np.asarray(np.isfinite(matrices).all(axis=(-2, -1)) & (singular[..., -1] > 1e-9 * singular[..., 0]))
 
 
 def _matrix_into(group: SkeletonGroup, binds: dict[int, Floats], positions: Floats) -> Floats | None:
