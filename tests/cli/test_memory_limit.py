@@ -19,7 +19,9 @@ import pytest
 from anim import memory
 from anim.errors import UnsupportedError
 from anim.gltf.meshopt import codec
+from anim.gltf.reading.accessors import Accessors
 from fixtures.broken.pieces import buffered, data_uri, text
+from tests.calls import count_calls
 from tests.cli.conftest import Call
 from tests.cli.running import ENVIRONMENT, ROOT, built, help_line, refusal
 
@@ -205,6 +207,15 @@ def test_decoded_data_of_a_small_file_has_a_limit(data: bytes, line: list[str], 
     assert "(limit 1 GB)" in run.err
     assert "--memory-limit" in help_line(run)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_page_counts_all_meshes_before_it_reads_one(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.gltf").write_bytes(compressed_views(300))
+    counted = count_calls(monkeypatch, Accessors, "floats")
+    assert "would take" in refusal(call("view", tmp_path / "a.gltf", "-o", tmp_path / "out.html"), 4)
+    assert not counted
 
 
 def test_the_limit_can_be_chosen(call: Call, tmp_path: Path) -> None:

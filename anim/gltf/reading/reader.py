@@ -111,7 +111,7 @@ def scene(
     _check(document)
     check_not_required(document)
     accessors = accessors or Accessors(document)
-    accessors.check_total(_vertex_accessors(document.json))
+    accessors.check_total(vertex_accessors(document.json))
     meshes = Meshes(document, accessors, normals=normals, tangents=tangents, repeats=repeats)
     skins = [_skin(i, skin, accessors) for i, skin in enumerate(json_array(document.json, "skins"))]
     nodes = json_array(document.json, "nodes")
@@ -206,21 +206,21 @@ def clip_name(name: str, number: int) -> str:
     return name or f"#{number}"
 
 
+def vertex_accessors(json: Json) -> Iterator[int]:
+    """Yield the accessors of positions and their morph targets, which are always read."""
+    for mesh in json_array(json, "meshes"):
+        for primitive in mesh["primitives"]:
+            for attributes in (primitive["attributes"], *primitive.get("targets", ())):
+                if "POSITION" in attributes:
+                    yield attributes["POSITION"]
+
+
 def _sampled_accessors(json: Json) -> Iterator[int]:
     """Accessors of all keys."""
     for animation in json_array(json, "animations"):
         for sampler in animation["samplers"]:
             yield sampler["input"]
             yield sampler["output"]
-
-
-def _vertex_accessors(json: Json) -> Iterator[int]:
-    """Accessors of positions and their morph targets, which are always read."""
-    for mesh in json_array(json, "meshes"):
-        for primitive in mesh["primitives"]:
-            for attributes in (primitive["attributes"], *primitive.get("targets", ())):
-                if "POSITION" in attributes:
-                    yield attributes["POSITION"]
 
 
 def _check(document: object) -> None:

@@ -104,7 +104,9 @@ def _is_draco(primitive: Json) -> bool:
 
 def _check_meshes(document: Document) -> list[str]:
     """Raise FormatError for meshes that cannot be read; note those with more influences than three.js uses."""
-    meshes, wide = Meshes(document, Accessors(document)), 0
+    accessors = Accessors(document)
+    accessors.check_total(reader.vertex_accessors(document.json))
+    meshes, wide = Meshes(document, accessors), 0
     skins = json_array(document.json, "skins")
     for i, node in enumerate(json_array(document.json, "nodes")):
         if "mesh" in node:
