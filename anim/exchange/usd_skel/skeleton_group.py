@@ -134,7 +134,7 @@ def _homogeneous(matrix: Floats) -> Floats:
 
 
 def _are_invertible(matrices: Floats) -> Bools:
-    """Whether affine matrices (..., 3 or 4, 4) have an inverse."""
+    """Mask (...) of affine matrices (..., 3 or 4, 4) that have an inverse."""
     singular = np.linalg.svd(matrices[..., :3, :3], compute_uv=False)
     return np.asarray(np.isfinite(matrices).all(axis=(-2, -1)) & (singular[..., -1] > 1e-9 * singular[..., 0]))
 
