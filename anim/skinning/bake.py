@@ -17,7 +17,7 @@ from anim.model import Clip, MeshInstance, MeshPart, PrimitiveRange, Scene, Vert
 from anim.sampling.pose import PosedSkeleton
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh, Make, bind_mesh
-from anim.skinning.chunk_pipeline import ChunkPipeline
+from anim.skinning.chunk_pipeline import ChunkPipeline, packed_size
 from anim.skinning.methods.blended import BlendedMethod
 from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
@@ -103,6 +103,7 @@ def prepare_bake(
         chosen = _wound_as_shown(chosen, rest)
         merged = merge_small_meshes(chosen, scene.skeleton, skinned=method == "lbs")
     bound = _bind_all(bind, merged, make)
+    packed_size(scene.skeleton, bound)  # refuses too many joints before any is posed
     return Baker(
         scene,
         tuple(chosen),

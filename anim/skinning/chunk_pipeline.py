@@ -26,6 +26,16 @@ MIN_VERTICES = 4096  # per thread
 MAX_VERTICES_ALONE = 4096  # of all frames: to start threads for fewer takes longer than to skin them
 
 
+def packed_size(skeleton: Skeleton, layers: Sequence[BoundMesh]) -> int:
+    """Return the bytes of a frame's matrices and morphed vertices.
+
+    Raises UnsupportedError if those of the smallest chunks are above the limit of memory.
+    """
+    packed = 96 * len(skeleton) + sum(layer.packed_size for layer in layers)
+    MemoryBudget(0).check(2 * LANES * packed)  # of two chunks at least
+    return packed
+
+
 @dataclass(frozen=True, slots=True)
 class ChunkPipeline:
     """Skinning of `vertices` columns by layers. threads: number of workers, without effect on the result."""
@@ -59,8 +69,7 @@ class ChunkPipeline:
                 progress(first)
 
     def _frames_per_chunk(self) -> int:
-        packed = 96 * len(self.skeleton) + sum(layer.packed_size for layer in self.layers)
-        MemoryBudget(0).check(2 * LANES * packed)  # of two chunks at least
+        packed = packed_size(self.skeleton, self.layers)
         blocks = min(CHUNK_BYTES // (12 * self.vertices * LANES), PACKED_BYTES // (packed * LANES), MAX_BLOCKS)
         return LANES * max(blocks, 1)
 

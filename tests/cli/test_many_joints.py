@@ -12,6 +12,7 @@ from anim.measure.compare import mesh_space
 from anim.skinning import bound_mesh
 from tests.calls import count_calls
 from tests.cli.conftest import Call
+from tests.cli.running import refusal
 from tests.cli.test_memory_limit import of_joints
 
 
@@ -52,3 +53,12 @@ def test_inverse_binds_for_usd_are_checked_at_once(call: Call, tmp_path: Path, m
     counted = count_calls(monkeypatch, np.linalg, "svd")
     call("convert", tmp_path / "in.gltf", tmp_path / "out.usda").product()
     assert 0 < len(counted) < 50
+
+
+def test_too_many_joints_are_refused_before_they_are_posed(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.gltf").write_bytes(of_joints(1000))
+    counted = count_calls(monkeypatch, bound_mesh.BoundMesh, "matrices")
+    assert "would take" in refusal(call("collapse", tmp_path / "in.gltf", "--memory-limit", "5MB"), 4)
+    assert not counted
