@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 
+from anim.gltf.validation import hierarchy
 from anim.measure.continuous_bound import node_bounds
 from anim.measure.continuous_bound.prover import Prover
 from anim.model import Mesh
 from tests import many
+from tests.calls import count_calls
 from tests.cli.conftest import Call
 from tests.cli.test_many import LIMIT, work
 
@@ -92,3 +94,12 @@ def test_equal_primitives_are_measured_once(
     command, *options = line.replace("OUT", "out.glb").replace("IN", str(path)).split()
     assert call(command, str(path), *options).code == 0
     assert max(stored) == 3
+
+
+def test_parents_are_found_once_for_all_baked_meshes(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.side_meshes(100))
+    counted = count_calls(monkeypatch, hierarchy, "parents")
+    call("bake", tmp_path / "in.glb", tmp_path / "out.glb", "--rigid", "--fps", "2").product()
+    assert 0 < len(counted) < 20

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
-from anim.caches.source_document import placement, retained_channels
+from anim.caches.source_document import retained_channels
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span
 from anim.caches.source_document.excluded_meshes import drop_meshes
+from anim.caches.source_document.placement import Placement, detach_meshes
 from anim.caches.source_document.primitives import BakedVertices, baked_primitives
 from anim.caches.source_document.winding import ReversedFaces, has_negative_determinant
 from anim.gltf.document import Document, Json, copy_json, json_array
+from anim.gltf.validation import hierarchy
 from anim.gltf.writing.new_accessors import NewAccessors, edit_document
 
 CLIP_NAME = "cache"  # of a bake without a clip
@@ -36,9 +38,13 @@ class DocumentEdit:
     roots: set[int] = field(default_factory=set)
     replaced: set[int] = field(default_factory=set)
     _reversed: ReversedFaces = field(init=False)
+    _parents: list[int] = field(init=False)  # of the source's nodes
+    _placement: Placement = field(init=False)
 
     def __post_init__(self) -> None:
         self._reversed = ReversedFaces(self.source.document)
+        self._parents = hierarchy.parents(self.source.document.json)
+        self._placement = Placement.of(self.json, self.source)
 
     @classmethod
     def of(cls, source: BakeSource, meshes: Sequence[BakedMesh]) -> DocumentEdit:
@@ -51,7 +57,7 @@ class DocumentEdit:
             if key in json:
                 json[key] = copy_json(json[key])
         json["meshes"] = list(json["meshes"])
-        placement.detach_meshes(json, {each.node for each in meshes} | source.left_out)
+        detach_meshes(json, {each.node for each in meshes} | source.left_out)
         return cls(source, meshes, json, NewAccessors(len(json_array(json, "accessors"))))
 
     def primitives(
@@ -59,7 +65,9 @@ class DocumentEdit:
     ) -> list[Json]:
         """Return the primitives of a baked mesh, in world space with reversed faces if its node mirrors them."""
         found = baked_primitives(self.new, self.source.document.json, baked, vertices, targets)
-        if self.source.in_mesh_space or not has_negative_determinant(self.source.document.json, baked.node):
+        if self.source.in_mesh_space or not has_negative_determinant(
+            self.source.document.json, self._parents, baked.node
+        ):
             return found
         return [
             self._reversed.of(self.new, each, span[1] - span[0]) if span[0] < span[1] else each
@@ -68,8 +76,8 @@ class DocumentEdit:
 
     def place(self, baked: BakedMesh, mesh: Json, node: Json) -> int:
         """Add a mesh in place of a baked one, on a node with the properties of `node`; return the node's index."""
-        index = placement.add_mesh(self.json, mesh, baked.mesh)
-        placed = placement.place_node(self.json, baked, self.source, {**node, "mesh": index})
+        index = self._placement.add_mesh(mesh, baked.mesh)
+        placed = self._placement.place_node(baked, {**node, "mesh": index})
         if not self.source.in_mesh_space:
             self.roots.add(placed)
         return placed
@@ -78,13 +86,17 @@ class DocumentEdit:
         """Add a mesh without a node, at the index of an `old` one that nothing uses; return its index."""
         if old is not None and old not in self.replaced:  # a mesh that several nodes share has pages for each
             self.replaced.add(old)
-            return placement.add_mesh(self.json, mesh, old)
+            return self._placement.add_mesh(mesh, old)
         self.json["meshes"].append(mesh)
         return len(self.json["meshes"]) - 1
 
-    def place_group(self, baked: BakedMesh, node: Json) -> int:
+    def place_new_node(self, baked: BakedMesh, node: Json) -> int:
         """Add a new node in the space of a baked mesh, with the properties of `node`; return its index."""
-        return placement.place_new_node(self.json, baked, self.source, node)
+        return self._placement.place_new_node(baked, node)
+
+    def place_group(self, baked: BakedMesh, nodes: Sequence[Json], parent: Json) -> int:
+        """Add nodes below a new one, `parent`, in the space of a baked mesh; return the index of the first node."""
+        return self._placement.place_group(baked, nodes, parent)
 
     def animate(self, nodes: Sequence[int], path: str, times: Floats, values: AnyArray) -> None:
         """Add a linear sampler, and a channel for it on each of the nodes."""

@@ -27,9 +27,7 @@ def replace_by_pages(cache: VertexCache, source: BakeSource, *, extras: Json, by
     pages = _pages(edit, cache, by_scale=by_scale)
     for i, baked in enumerate(edit.meshes):
         nodes = [flipbook_keys.page(row[i], frame, by_scale=by_scale) for frame, row in enumerate(pages)]
-        first = len(edit.json["nodes"])
-        edit.json["nodes"] += nodes
-        edit.place_group(baked, {"children": list(range(first, first + len(nodes))), "extras": extras})
+        first = edit.place_group(baked, nodes, {"extras": extras})
         _animate(edit, cache, first, by_scale=by_scale)
     edit.require(*flipbook_keys.extensions(cache.frame_count, by_scale=by_scale), optional=True)
     return edit.document()

@@ -45,7 +45,7 @@ def place_lookup_mesh(
         primitives = edit.primitives(each, vertices, {})
         _add_lookup(edit, each, primitives, lookup, last)
         mesh = edit.add_mesh(baked_mesh(document.json, each, primitives), each.mesh)
-        edit.place_group(each, {"mesh": mesh})
+        edit.place_new_node(each, {"mesh": mesh})
     return edit.document()
 
 

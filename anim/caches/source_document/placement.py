@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, baked_name
 from anim.gltf.document import Json, json_array
@@ -18,67 +20,108 @@ def detach_meshes(json: Json, nodes: Collection[int]) -> None:
             json["nodes"][node].pop(key, None)
 
 
-def add_mesh(json: Json, mesh: Json, old: int) -> int:
-    """Store a mesh in place of the `old` one, or after all if a node uses that; return its index."""
-    if any(node.get("mesh") == old for node in json["nodes"]):
-        json["meshes"].append(mesh)
-        return len(json["meshes"]) - 1
-    json["meshes"][old] = mesh
-    return old
+@dataclass(slots=True)
+class Placement:
+    """Nodes and meshes of an edited document, in place, with what each baked mesh asks about all of them.
 
-
-def place_node(json: Json, baked: BakedMesh, source: BakeSource, node: Json) -> int:
-    """Add what `node` has to the node of a baked mesh, or to a new node in its space; return the index.
-
-    Vertices in mesh space stay on their node, or below it if `node` has a transform. Vertices in world space belong to
-    a root: the node itself, without its transform, if it has no children and is no joint, else a new one.
+    parents: of each node, −1 for roots. roots: the nodes of each scene. joints: nodes that are joints of a skin.
+    num_users: number of nodes with each mesh.
     """
-    own = json["nodes"][baked.node]
-    joints = {joint for skin in json_array(source.document.json, "skins") for joint in skin["joints"]}
-    is_free = not own.get("children") and baked.node not in joints and not source.in_mesh_space
-    if not is_free and (not source.in_mesh_space or any(key in node for key in (*TRANSFORMS, "extras"))):
-        return place_new_node(json, baked, source, node)
-    if not source.in_mesh_space:
-        _make_root(json, baked.node, _scenes_of(json, baked.node))
-        for key in TRANSFORMS:
-            own.pop(key, None)
-    extras = own.get("extras")
-    own.update(node)
-    if isinstance(extras, dict) and "extras" in node:
-        own["extras"] = {**extras, **node["extras"]}
-    return baked.node
 
+    json: Json
+    source: BakeSource
+    parents: list[int]
+    roots: list[set[int]]
+    joints: frozenset[int]
+    num_users: Counter[int]
 
-def place_new_node(json: Json, baked: BakedMesh, source: BakeSource, node: Json) -> int:
-    """Append a node, below that of a baked mesh in mesh space, else to the scenes that hold it; return its index."""
-    json["nodes"].append({"name": baked_name(json, baked.node), **node})
-    index = len(json["nodes"]) - 1
-    if source.in_mesh_space:
-        json["nodes"][baked.node].setdefault("children", []).append(index)
-    else:
-        for scene in _scenes_of(json, baked.node):
-            scene["nodes"].append(index)
-    return index
+    @classmethod
+    def of(cls, json: Json, source: BakeSource) -> Placement:
+        """Return the placement in a document whose baked meshes are detached."""
+        return cls(
+            json,
+            source,
+            hierarchy.parents(json),
+            [set(scene.get("nodes", ())) for scene in json_array(json, "scenes")],
+            frozenset(joint for skin in json_array(source.document.json, "skins") for joint in skin["joints"]),
+            Counter(node["mesh"] for node in json_array(json, "nodes") if "mesh" in node),
+        )
 
+    def add_mesh(self, mesh: Json, old: int) -> int:
+        """Store a mesh in place of the `old` one, or after all if a node uses that; return its index."""
+        if self.num_users[old]:
+            self.json["meshes"].append(mesh)
+            return len(self.json["meshes"]) - 1
+        self.json["meshes"][old] = mesh
+        return old
 
-def _scenes_of(json: Json, node: int) -> list[Json]:
-    """Scenes that hold a node."""
-    parents = hierarchy.parents(json)
-    chain = {node}
-    while parents[node] >= 0:
-        node = parents[node]
-        chain.add(node)
-    return [scene for scene in json_array(json, "scenes") if chain.intersection(scene.get("nodes", ()))]
+    def place_node(self, baked: BakedMesh, node: Json) -> int:
+        """Add what `node` has to the node of a baked mesh, or to a new node in its space; return the index.
 
+        Vertices in mesh space stay on their node, or below it if `node` has a transform. Vertices in world space belong
+        to a root: the node itself, without its transform, if it has no children and is no joint, else a new one.
+        """
+        own, in_mesh_space = self.json["nodes"][baked.node], self.source.in_mesh_space
+        is_free = not own.get("children") and baked.node not in self.joints and not in_mesh_space
+        if not is_free and (not in_mesh_space or any(key in node for key in (*TRANSFORMS, "extras"))):
+            return self.place_new_node(baked, node)
+        if not in_mesh_space:
+            self._make_root(baked.node)
+            for key in TRANSFORMS:
+                own.pop(key, None)
+        extras = own.get("extras")
+        own.update(node)
+        if isinstance(extras, dict) and "extras" in node:
+            own["extras"] = {**extras, **node["extras"]}
+        self._count(node)
+        return baked.node
 
-def _make_root(json: Json, node: int, scenes: Sequence[Json]) -> None:
-    """Move a node from its parent to the roots of scenes, in place."""
-    for each in json["nodes"]:
-        children = each.get("children", [])
-        if node in children:
-            children.remove(node)
-            if not children:
-                del each["children"]
-    for scene in scenes:
-        if node not in scene.setdefault("nodes", []):
-            scene["nodes"].append(node)
+    def place_new_node(self, baked: BakedMesh, node: Json) -> int:
+        """Append a node, below that of a baked mesh, or in world space to the scenes that hold it; return its index."""
+        self.json["nodes"].append({"name": baked_name(self.json, baked.node), **node})
+        index = len(self.json["nodes"]) - 1
+        if self.source.in_mesh_space:
+            self.json["nodes"][baked.node].setdefault("children", []).append(index)
+        else:
+            self._add_root(index, self._scenes_of(baked.node))
+        self.parents.append(baked.node if self.source.in_mesh_space else -1)
+        self._count(node)
+        return index
+
+    def place_group(self, baked: BakedMesh, nodes: Sequence[Json], parent: Json) -> int:
+        """Append nodes below a new `parent`, which is placed like a new node; return the index of the first one."""
+        first, count = len(self.json["nodes"]), len(nodes)
+        self.json["nodes"] += nodes
+        self.parents += [first + count] * count
+        for node in nodes:
+            self._count(node)
+        self.place_new_node(baked, {"children": list(range(first, first + count)), **parent})
+        return first
+
+    def _count(self, node: Json) -> None:
+        if "mesh" in node:
+            self.num_users[node["mesh"]] += 1
+
+    def _scenes_of(self, node: int) -> list[int]:
+        """Indices of the scenes that hold a node."""
+        chain = [node]
+        while self.parents[chain[-1]] >= 0:
+            chain.append(self.parents[chain[-1]])
+        return [i for i, roots in enumerate(self.roots) if not roots.isdisjoint(chain)]
+
+    def _make_root(self, node: int) -> None:
+        """Move a node from its parent to the roots of the scenes that hold it."""
+        scenes, above = self._scenes_of(node), self.parents[node]
+        if above >= 0:
+            parent = self.json["nodes"][above]
+            parent["children"].remove(node)
+            if not parent["children"]:
+                del parent["children"]
+            self.parents[node] = -1
+        self._add_root(node, scenes)
+
+    def _add_root(self, node: int, scenes: Collection[int]) -> None:
+        for i in scenes:
+            if node not in self.roots[i]:
+                self.roots[i].add(node)
+                self.json["scenes"][i]["nodes"].append(node)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,6 @@ from anim.arrays import Ints
 from anim.gltf.document import Document, Json
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES
-from anim.gltf.validation import hierarchy
 from anim.gltf.writing.append import INDICES
 from anim.gltf.writing.new_accessors import NewAccessors
 
@@ -48,9 +48,9 @@ def reversed_indices(indices: Ints, mode: int) -> Ints:
     return np.concatenate((indices[:1], indices[:0:-1]))
 
 
-def has_negative_determinant(json: Json, node: int) -> bool:
-    """Return whether the world matrix of a node at rest has a negative determinant."""
-    parents, sign = hierarchy.parents(json), 1.0
+def has_negative_determinant(json: Json, parents: Sequence[int], node: int) -> bool:
+    """Return whether the world matrix of a node at rest has a negative determinant. parents: of all nodes."""
+    sign = 1.0
     while node >= 0:
         own = json["nodes"][node]
         if "matrix" in own:
