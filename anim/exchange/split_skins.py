@@ -19,26 +19,39 @@ def split_by_root(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh
     roots = np.unique(root_of)
     if len(roots) < 2:
         return [(mesh, skin)]
+    root_of_vertex = root_of[mesh.joints[:, 0]]
+    root_of_face = root_of_vertex[mesh.faces[:, 0]]
+    parts = zip(*(_parts(each, roots) for each in (root_of, root_of_vertex, root_of_face)), strict=True)
+    place, new = _places(root_of, roots), _places(root_of_vertex, roots)
     bodies = []
-    for number, root in enumerate(roots.tolist(), 1):
-        own = np.flatnonzero(root_of == root)
-        place: Ints = np.zeros(len(skin.joints), np.int64)
-        place[own] = np.arange(len(own))
-        kept = np.flatnonzero(root_of[mesh.joints[:, 0]] == root)
-        new: Ints = np.zeros(len(mesh.positions), np.int64)
-        new[kept] = np.arange(len(kept))
+    for number, (root, (own, kept, shown)) in enumerate(zip(roots.tolist(), parts, strict=True), 1):
+        joints, faces = mesh.joints[kept], mesh.faces[shown]
         body = replace(
             mesh,
             name=f"{mesh.name} {number}",
             positions=mesh.positions[kept],
             normals=None if mesh.normals is None else mesh.normals[kept],
-            faces=new[mesh.faces[np.isin(mesh.faces[:, 0], kept)]],
-            joints=place[mesh.joints[kept]],
+            faces=np.where(root_of_vertex[faces] == root, new[faces], 0),
+            joints=np.where(root_of[joints] == root, place[joints], 0),
             weights=mesh.weights[kept],
             targets=mesh.targets[:, kept],
         )
         bodies.append((body, Skin(skin.joints[own], skin.inverse_bind[own])))
     return bodies
+
+
+def _parts(root_of: Ints, roots: Ints) -> list[Ints]:
+    """Indices of the elements (n,) with each root, increasing."""
+    order = np.argsort(root_of, kind="stable")
+    return np.split(order, np.searchsorted(root_of[order], roots[1:]))
+
+
+def _places(root_of: Ints, roots: Ints) -> Ints:
+    """Place of each element (n,) among those with its root."""
+    found: Ints = np.empty(len(root_of), np.int64)
+    for part in _parts(root_of, roots):
+        found[part] = np.arange(len(part))
+    return found
 
 
 def _roots(skeleton: Skeleton) -> Ints:

@@ -11,6 +11,7 @@ from anim.gltf.validation import hierarchy
 from anim.measure.continuous_bound import node_bounds
 from anim.measure.continuous_bound.prover import Prover
 from anim.model import Mesh
+from anim.show.page import sticks
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
@@ -103,3 +104,10 @@ def test_parents_are_found_once_for_all_baked_meshes(
     counted = count_calls(monkeypatch, hierarchy, "parents")
     call("bake", tmp_path / "in.glb", tmp_path / "out.glb", "--rigid", "--fps", "2").product()
     assert 0 < len(counted) < 20
+
+
+def test_sticks_of_many_trees_are_stored_at_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "in.glb").write_bytes(many.side(50))
+    counted = count_calls(monkeypatch, sticks, "append_accessors")
+    call("view", tmp_path / "in.glb", "-o", tmp_path / "out.html").product()
+    assert len(counted) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,10 @@ VERTICES, INDICES = 34962, 34963  # buffer view targets
 MAX_UINT16 = 65_534  # the largest value restarts primitives
 COMPONENT_TYPES = {np.dtype(dtype).str: component for component, dtype in DTYPES.items()}
 ELEMENTS = {**BY_WIDTH, 16: "MAT4"}
+Contents: TypeAlias = list[tuple[NDArray[np.generic], int | None]]  # rows (n, C), and the target of their view
 
 
-def append_accessors(
-    document: Document, contents: Sequence[tuple[NDArray[np.generic], int | None]]
-) -> tuple[Document, list[int]]:
+def append_accessors(document: Document, contents: Contents) -> tuple[Document, list[int]]:
     """Return the document with new accessors, each with a buffer view of its own, and their indices.
 
     contents: rows (n, C) of a type that glTF stores, little-endian, and the target of the view or None. `min` and
@@ -59,14 +59,7 @@ def append_mesh(
 
     positions, normals: (V, 3). faces: (T, 3) vertex indices. material: its JSON, appended to `materials`.
     """
-    index_type = "<u2" if len(positions) <= MAX_UINT16 else "<u4"
-    contents: list[tuple[NDArray[np.generic], int | None]] = [
-        (faces.reshape(-1, 1).astype(index_type), INDICES),
-        (positions.astype("<f4"), VERTICES),
-    ]
-    if normals is not None:
-        contents.append((normals.astype("<f4"), VERTICES))
-    document, indices = append_accessors(document, contents)
+    document, indices = append_accessors(document, mesh_accessors(positions, faces, normals))
     attributes = dict(zip(("POSITION", "NORMAL"), indices[1:], strict=False))
     primitive: Json = {"attributes": attributes, "indices": indices[0]}
     json = dict(document.json)
@@ -75,6 +68,18 @@ def append_mesh(
         primitive["material"] = len(json["materials"]) - 1
     json["meshes"] = [*json_array(json, "meshes"), {"name": name, "primitives": [primitive]}]
     return _with_json(document, json), len(json["meshes"]) - 1
+
+
+def mesh_accessors(positions: Floats, faces: Ints, normals: Floats | None = None) -> Contents:
+    """Return the contents of a mesh's accessors: indices, positions, and normals if there are some."""
+    index_type = "<u2" if len(positions) <= MAX_UINT16 else "<u4"
+    contents: Contents = [
+        (faces.reshape(-1, 1).astype(index_type), INDICES),
+        (positions.astype("<f4"), VERTICES),
+    ]
+    if normals is not None:
+        contents.append((normals.astype("<f4"), VERTICES))
+    return contents
 
 
 def append_nodes(document: Document, nodes: Sequence[Json], *, in_scene: bool = True) -> tuple[Document, list[int]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -10,10 +11,11 @@ from anim.exchange.split_skins import split_by_root
 from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading import reader
-from anim.gltf.writing.append import append_accessors, append_mesh, append_nodes
+from anim.gltf.writing.append import Contents, append_accessors, append_nodes, mesh_accessors
 from anim.model import Mesh, Skeleton, Skin
 
 MAX_JOINTS_OF_BYTES = 256
+ATTRIBUTES = ("indices", "POSITION", "NORMAL", "JOINTS_0", "WEIGHTS_0", "inverseBindMatrices")  # of each mesh, in order
 MATERIAL: Json = {
     "name": "sticks",
     "pbrMetallicRoughness": {"baseColorFactor": [0.7, 0.7, 0.7, 1.0], "metallicFactor": 0.0},
@@ -25,26 +27,36 @@ def add_sticks(document: Document) -> Document:
     skeleton = reader.skeleton(document)
     if len(skeleton) < 2:
         return document
-    for mesh, skin in split_by_root(skeleton, *stick_mesh(skeleton, _ends(skeleton))):
-        if len(mesh.positions):
-            document = _append(document, mesh, skin)
-    return document
-
-
-def _append(document: Document, mesh: Mesh, skin: Skin) -> Document:
-    document, number = append_mesh(document, mesh.name, mesh.positions, mesh.faces, mesh.normals, MATERIAL)
-    joints = mesh.joints.astype("<u2" if len(skin.joints) > MAX_JOINTS_OF_BYTES else "<u1")
-    document, (held, weights, bind) = append_accessors(
-        document, [(joints, None), (mesh.weights.astype("<f4"), None), (_columns(skin), None)]
-    )
+    split = split_by_root(skeleton, *stick_mesh(skeleton, _ends(skeleton)))
+    bodies = [(mesh, skin) for mesh, skin in split if len(mesh.positions)]
+    if not bodies:
+        return document
+    contents = list(chain.from_iterable(_contents(*each) for each in bodies))
+    document, indices = append_accessors(document, contents)  # in one call: each copies all bytes
     json = dict(document.json)
-    primitive = json["meshes"][number]["primitives"][0]
-    attributes = {**primitive["attributes"], "JOINTS_0": held, "WEIGHTS_0": weights}
-    meshes = [*json["meshes"]]
-    meshes[number] = {**meshes[number], "primitives": [{**primitive, "attributes": attributes}]}
-    skins = [*json_array(json, "skins"), {"joints": skin.joints.tolist(), "inverseBindMatrices": bind}]
-    document = replace(document, json={**json, "meshes": meshes, "skins": skins})
-    return append_nodes(document, [{"name": mesh.name, "mesh": number, "skin": len(skins) - 1}])[0]
+    materials, meshes, skins = ([*json_array(json, key)] for key in ("materials", "meshes", "skins"))
+    nodes: list[Json] = []
+    for (mesh, skin), first in zip(bodies, range(indices[0], indices[-1] + 1, len(ATTRIBUTES)), strict=True):
+        attributes = dict(zip(ATTRIBUTES, range(first, first + len(ATTRIBUTES)), strict=True))
+        held, bind = attributes.pop("indices"), attributes.pop("inverseBindMatrices")
+        primitive = {"attributes": attributes, "indices": held, "material": len(materials)}
+        nodes.append({"name": mesh.name, "mesh": len(meshes), "skin": len(skins)})
+        materials.append(MATERIAL)
+        meshes.append({"name": mesh.name, "primitives": [primitive]})
+        skins.append({"joints": skin.joints.tolist(), "inverseBindMatrices": bind})
+    json |= {"materials": materials, "meshes": meshes, "skins": skins}
+    return append_nodes(replace(document, json=json), nodes)[0]
+
+
+def _contents(mesh: Mesh, skin: Skin) -> Contents:
+    """Rows of the accessors of ATTRIBUTES, and the targets of their buffer views."""
+    joints = mesh.joints.astype("<u2" if len(skin.joints) > MAX_JOINTS_OF_BYTES else "<u1")
+    return [
+        *mesh_accessors(mesh.positions, mesh.faces, mesh.normals),
+        (joints, None),
+        (mesh.weights.astype("<f4"), None),
+        (_columns(skin), None),
+    ]
 
 
 def _columns(skin: Skin) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
