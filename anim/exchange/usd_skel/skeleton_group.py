@@ -124,7 +124,8 @@ def _inverse_binds(instance: MeshInstance, skin: Skin, scene: Scene, rest: Float
     for node, matrix, is_sound in zip(first, inverse, _are_invertible(inverse).tolist(), strict=True):
         found[node] = _homogeneous(matrix if is_sound else rest[node])
         if not is_sound:
-            found[node] = np.linalg.inv(found[node]) if _are_invertible(found[node]) else np.eye(4)
+            inverted = np.linalg.inv(found[node]) if _are_invertible(found[node]) else np.eye(4)
+            found[node] = np.asarray(inverted, np.float64)
     return found
 
 

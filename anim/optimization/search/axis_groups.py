@@ -57,8 +57,8 @@ def _stackable(asked: Sequence[Reaches]) -> Iterator[list[Reaches]]:
 class _Grouping:
     """Groups of tracks of B clips in padded arrays, with the bytes that merging each pair of them saves.
 
-    reach: (B, G, K) of all tracks of each group together. last: (B,) key of each clip. width: (B, G) bytes of one key of
-    a group. cost: (B, G) bytes. gain: (B, G, G) bytes.
+    reach: (B, G, K) of all tracks of each group together. last: (B,) key of each clip. width: (B, G) bytes of one key
+    of a group. cost: (B, G) bytes. gain: (B, G, G) bytes.
     """
 
     def __init__(self, clips: Sequence[Reaches], axis_bytes: float, time_bytes: float) -> None:

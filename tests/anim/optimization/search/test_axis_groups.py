@@ -26,12 +26,12 @@ def _groups(*reaches: Ints) -> list[list[list[int]]]:
     return [[group.tolist() for group in some] for some in found]
 
 
-def _num_keys(reach: Ints) -> list[int]:
-    return num_keys(reach, np.array(reach.shape[-1] - 1)).tolist()
+def _num_keys(reach: Ints) -> Ints:
+    return num_keys(reach, np.array(reach.shape[-1] - 1))
 
 
 def _bytes(reach: Ints, groups: list[list[int]]) -> float:
-    counts = _num_keys(np.array([reach[each].min(axis=0) for each in groups]))
+    counts = _num_keys(np.array([reach[each].min(axis=0) for each in groups])).tolist()
     widths = [float(KEY_BYTES[each].sum()) for each in groups]
     return sum(AXIS_BYTES + n * (TIME_BYTES + width) for n, width in zip(counts, widths, strict=True))
 
@@ -48,9 +48,9 @@ def _partitions(items: list[int]) -> Iterator[list[list[int]]]:
 
 def test_keys_from_the_first_to_the_last() -> None:
     reach = np.array([[1, 3, 3, 3], [3, 3, 3, 3], [1, 2, 3, 3]])
-    assert _num_keys(reach) == [3, 2, 4]
-    assert _num_keys(reach[:, None]) == [[3], [2], [4]]
-    assert _num_keys(np.zeros((1, 1), np.int64)) == [1]
+    assert _num_keys(reach).tolist() == [3, 2, 4]
+    assert _num_keys(reach[:, None]).tolist() == [[3], [2], [4]]
+    assert _num_keys(np.zeros((1, 1), np.int64)).tolist() == [1]
     assert num_keys(reach, np.array([1, 3, 2])).tolist() == [2, 2, 3]
 
 
