@@ -31,7 +31,7 @@ def _num_keys(reach: Ints) -> Ints:
 
 
 def _bytes(reach: Ints, groups: list[list[int]]) -> float:
-    counts = _num_keys(np.array([reach[each].min(axis=0) for each in groups])).tolist()
+    counts: list[int] = _num_keys(np.array([reach[each].min(axis=0) for each in groups])).tolist()
     widths = [float(KEY_BYTES[each].sum()) for each in groups]
     return sum(AXIS_BYTES + n * (TIME_BYTES + width) for n, width in zip(counts, widths, strict=True))
 
