@@ -38,6 +38,9 @@ def test_odd_materials_are_drawn_or_refused(
     run = call("render", tmp_path / "in.glb", tmp_path / "out.png", "--frames", "1", "--clip", "#0")
     assert run.code in (0, 3), run.err
     assert "Traceback" not in run.err
+    for name in ("out.usda", "out.glb"):
+        run = call("bake", tmp_path / "in.glb", tmp_path / name, "--fps", "4", "--clip", "#0")
+        assert run.code in (0, 3), run.err
 
 
 def test_faces_of_fractions_are_refused(call: Call, tmp_path: Path) -> None:

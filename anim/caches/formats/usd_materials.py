@@ -16,7 +16,7 @@ from anim.arrays import AnyArray, Ints
 from anim.caches.formats.texture_coordinates import texture_coordinates
 from anim.caches.formats.usd_surface_inputs import TextureInput, constant_inputs, input_types, texture_inputs
 from anim.caches.source_document.bake_source import BakedMesh, Span, baked_meshes
-from anim.caches.source_document.lit_meshes import find_item
+from anim.caches.source_document.checked_materials import find_item, find_material
 from anim.errors import FormatError, UnsupportedError
 from anim.gltf.document import Document, Json
 from anim.gltf.reading.accessors import Accessors
@@ -56,7 +56,7 @@ class UsdMaterials:
     def _define(self, number: int) -> Any:
         from pxr import Sdf, UsdShade
 
-        about = find_item(self._document.json, "materials", number)
+        about = find_material(self._document.json, number)
         path = Sdf.Path(f"{self._scope}/{_material_name(number)}")
         material = UsdShade.Material.Define(self._stage, path)
         if about.get("name"):
@@ -77,7 +77,7 @@ class UsdMaterials:
     def note_losses(self, primitives: Iterable[Json]) -> None:
         """Note vertex colors and scales of normal maps, which UsdPreviewSurface does not have."""
         listed = list(primitives)
-        used = [find_item(self._document.json, "materials", each.get("material")) for each in listed]
+        used = [find_material(self._document.json, each.get("material")) for each in listed]
         normals = [each.get("normalTexture", {}) for each in used]
         if any("COLOR_0" in each["attributes"] for each in listed):
             self._note("vertex colors are left out: UsdPreviewSurface does not have them")
@@ -186,7 +186,7 @@ def bind_primitives(
     for number in sorted({number for each, _ in primitives for number in _coordinate_sets(document.json, each)}):
         _add_coordinates(document, mesh, primitives, number, num_vertices)
     used = [each.get("material", -1) for each, _ in primitives]
-    about = [find_item(document.json, "materials", number) for number in used]
+    about = [find_material(document.json, number) for number in used]
     materials.note_losses(each for each, _ in primitives)
     mesh.CreateDoubleSidedAttr(any(each.get("doubleSided", False) for each in about))
     starts = np.array([span[0] for _, span in primitives])
@@ -234,7 +234,7 @@ def _primitives(document: Document, meshes: Sequence[BakedMesh]) -> Iterator[tup
 
 def _coordinate_sets(json: Json, primitive: Json) -> set[int]:
     """Sets of texture coordinates that a primitive's material uses, and the first one."""
-    infos = [each.info for each in texture_inputs(find_item(json, "materials", primitive.get("material")))]
+    infos = [each.info for each in texture_inputs(find_material(json, primitive.get("material")))]
     wanted = {0, *map(_coordinate_set, infos)}
     return {each for each in wanted if f"TEXCOORD_{each}" in primitive["attributes"]}
 

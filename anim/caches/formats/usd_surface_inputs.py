@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from anim.caches.source_document.checked_materials import EMISSIVE_STRENGTH
 from anim.caches.source_document.lit_meshes import UNLIT
 from anim.gltf.document import Json
 from anim.gltf.reading.materials import DEFAULT_ALPHA_CUTOFF
 
-EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
 

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from anim.gltf.document import Json, json_array
+from anim.caches.source_document.checked_materials import find_material
+from anim.gltf.document import Json
 
 UNLIT = "KHR_materials_unlit"
-
-
-def find_item(json: Json, key: str, index: object) -> Json:
-    """Return an object of a top-level array, {} for an index that the file does not have."""
-    found = json_array(json, key)
-    item = found[index] if type(index) is int and 0 <= index < len(found) else {}
-    return item if isinstance(item, dict) else {}
 
 
 def has_lit_normals(json: Json, nodes: Iterable[int]) -> bool:
     """Return whether a mesh on the nodes has normals and a material that they shade."""
     return any(
-        "NORMAL" in each["attributes"]
-        and UNLIT not in find_item(json, "materials", each.get("material")).get("extensions", {})
+        "NORMAL" in each["attributes"] and UNLIT not in find_material(json, each.get("material")).get("extensions", {})
         for each in _primitives(json, nodes)
     )
 
@@ -28,7 +21,7 @@ def has_lit_normals(json: Json, nodes: Iterable[int]) -> bool:
 def has_mapped_tangents(json: Json, nodes: Iterable[int]) -> bool:
     """Return whether all primitives on the nodes have tangents, and one of them a normal map."""
     found = list(_primitives(json, nodes))
-    is_mapped = any("normalTexture" in find_item(json, "materials", each.get("material")) for each in found)
+    is_mapped = any("normalTexture" in find_material(json, each.get("material")) for each in found)
     return is_mapped and all("TANGENT" in each["attributes"] for each in found)
 
 
