@@ -53,8 +53,10 @@ def find_item(json: Json, key: str, index: object) -> Json:
 def find_material(json: Json, index: object) -> Json:
     """Return a material, {} for an index that the file does not have.
 
-    Raises FormatError for properties of other types than the specification's.
+    index: None for a primitive without one. Raises FormatError for properties of other types than the specification's.
     """
+    if index is not None and type(index) is not int:
+        raise FormatError(f"a primitive's material is {repr(index)[:60]} (expected a whole number)")
     found = find_item(json, "materials", index)
     try:
         _MATERIAL(found)
