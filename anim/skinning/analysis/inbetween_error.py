@@ -16,7 +16,7 @@ from anim.skinning.analysis.extreme_vertices import reduce_scene
 from anim.skinning.bake import Baker, prepare_bake
 
 MAX_SEGMENTS = 50_000  # sampled on a few vertices
-MAX_SEGMENTS_PER_KEY_INTERVAL = 8  # between two keys motion is smooth, and so is its error
+MAX_SEGMENTS_PER_KEY_INTERVAL = 8  # between two keys the error of LINEAR and slerp changes little; see `_may_spin`
 MAX_INTERVALS = 4  # sampled on all vertices
 BLOCK_SEGMENTS = 512  # at once
 COARSE_PARTS = (0.25, 0.5, 0.75)  # of a segment: an eased motion has no error half-way, but elsewhere
@@ -60,9 +60,9 @@ class InbetweenMetric:
     def largest_error(self, clip: Clip, times: Floats) -> InbetweenError:
         """Return the largest inter-frame error found between frames at `times` (F,) s, increasing.
 
-        Segments between frames and keys, some of those between two keys, are sampled in quarters, at keys and before
-        those of STEP, on the extreme vertices of each joint; the intervals with the largest errors again in eighths, on
-        all vertices. Elsewhere it may be larger.
+        Segments between frames and keys (without splines of rotations, some of those between two keys) are sampled in
+        quarters, at keys and before those of STEP, on the extreme vertices of each joint; the intervals with the
+        largest errors again in eighths, on all vertices. Elsewhere it may be larger.
         """
         segments = _segments(clip, times)
         errors = _coarse_errors(self._reduced, clip, times, segments)
@@ -78,10 +78,19 @@ def _segments(clip: Clip, times: Floats) -> _Segments:
     knots = np.union1d(times, inside)
     frame = np.searchsorted(times, knots[:-1], side="right") - 1
     key_interval = np.searchsorted(inside, knots[:-1], side="right")
-    chosen = _spread(np.bincount(key_interval, minlength=len(inside) + 1))
+    counts = np.bincount(key_interval, minlength=len(inside) + 1)
+    chosen = np.arange(len(frame)) if _may_spin(clip) else _spread(counts)
     if len(chosen) > MAX_SEGMENTS:
         chosen = chosen[np.linspace(0, len(chosen) - 1, MAX_SEGMENTS).round().astype(int)]
     return _Segments(knots[:-1], knots[1:], frame).select(chosen)
+
+
+def _may_spin(clip: Clip) -> bool:
+    """Return whether a spline of quaternions may come near 0, where it turns as far as it likes within one frame."""
+    return any(
+        track.interpolation is Interpolation.CUBICSPLINE and track.path in ("rotation", "pointer")
+        for track in clip.tracks
+    )
 
 
 def _spread(counts: Ints) -> Ints:

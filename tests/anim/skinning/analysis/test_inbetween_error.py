@@ -77,6 +77,16 @@ def test_a_key_between_two_of_many_frames_is_found() -> None:
     assert found.distance == pytest.approx(2 * np.sqrt(2), rel=1e-3)
 
 
+def test_a_spline_of_quaternions_that_turns_within_one_frame_is_found() -> None:
+    """Keys nearly opposite as quaternions: the spline passes near 0, and all of the turn is there."""
+    half = np.radians([0, 359.5]) / 2
+    keys = np.stack((0 * half, 0 * half, np.sin(half), np.cos(half)), axis=1)
+    flip = clip(track("rotation", [0, 4], keys, CUBICSPLINE, tangents=(0 * keys, 0 * keys)))
+    found = inbetween_error(_rigid(), flip, frame_times(0, 4, fps=60))
+    assert found.time == pytest.approx(2, abs=0.05)
+    assert found.distance > 0.5
+
+
 def test_the_widest_gaps_are_looked_into() -> None:
     """Many gaps, of which one is twice as wide; against every middle of the whole, as one bake."""
     of = random_scene(3)
