@@ -7,7 +7,7 @@ import math
 import os
 import re
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from typing import Any
 
@@ -90,11 +90,12 @@ class Command(Parsing, TyperCommand):
         documents.check_file(path)
         if os.path.realpath(path) == os.path.realpath(output):
             raise UsageError(f"{path}: --depfile would replace OUT (expected another file)")
+        _refuse_named_file(path, ctx.params.values())
         with depfile.record_files() as record:
             code = super().invoke(ctx)
         if not code and not ctx.params.get("dry_run"):
             if os.path.realpath(path) in map(os.path.realpath, record.inputs):
-                raise UsageError(f"{path}: --depfile would replace an input (expected another file)")
+                _refuse_input(path)
             outputs = list(record.outputs) if "{" in output else [output]
             documents.write_text(depfile.rule(outputs or [output], list(record.inputs)), path)
         return code
@@ -107,6 +108,20 @@ class Command(Parsing, TyperCommand):
             if shown:
                 with formatter.section(heading):
                     formatter.write_dl(shown)
+
+
+def _refuse_named_file(path: str, values: Iterable[Any]) -> None:
+    """Raise UsageError before the command runs if one of its arguments or options names the dependency file."""
+    for value in values:
+        for each in [value] if isinstance(value, str) else value if isinstance(value, list | tuple) else ():
+            if isinstance(each, str) and os.path.realpath(each) == os.path.realpath(path):
+                _refuse_input(path)
+
+
+def _refuse_input(path: str) -> None:
+    from cli.errors import UsageError
+
+    raise UsageError(f"{path}: --depfile would replace an input (expected another file)")
 
 
 def _memory_option() -> TyperOption:

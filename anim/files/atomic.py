@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -49,21 +48,30 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     target, temporary = resolver.resolve_links(path), None
     with temporary_files() as made:
         with name_errors(path):
-            check_writable(path)
-            if (number := descriptor_of(path)) is not None:
-                with os.fdopen(os.dup(number), "wb", buffering=0) as stream:
-                    write_stream(stream, (piece.data for piece in pieces), str(path))
-            elif target.exists() and not target.is_file():
-                with target.open("wb") as file:
-                    file.writelines(piece.data for piece in pieces)
-            elif not has_bytes(target, pieces):
+            if is_special := _is_special(path):
+                with _open_special(path) as file:
+                    write_stream(file, (piece.data for piece in pieces), str(path))
+            else:
+                check_writable(path)
+            if not is_special and not has_bytes(target, pieces):
                 temporary = write_temporary(target, pieces, made)
         yield
         with name_errors(path):
             if temporary is not None:
                 os.replace(temporary, target)
-            elif target.is_file() and number is None:
+            elif not is_special:
                 os.utime(target)
+
+
+def _is_special(path: Path) -> bool:
+    """Return whether a path is written directly: a device, a named pipe, or what this process has open."""
+    return descriptor_of(path) is not None or (path.exists() and not path.is_file())
+
+
+def _open_special(path: Path) -> BinaryIO:
+    """Open it for writing: an open file at its position, which opening its path again would lose."""
+    number = descriptor_of(path)
+    return path.open("wb", buffering=0) if number is None else os.fdopen(os.dup(number), "wb", buffering=0)
 
 
 def descriptor_of(path: Path) -> int | None:
@@ -97,7 +105,7 @@ class AtomicOutputs:
     def create(self, name: str) -> BinaryIO:
         """Return a new file of this name, open for writing and reading."""
         path = self.folder / name
-        if path.exists() and not path.is_file():  # companions of /dev/null would be in a shared folder
+        if _is_special(path):  # companions of /dev/null would be in a shared folder
             path = Path(tempfile.gettempdir()) / name
         with signals.hold_signals():  # one in between would leave a file that nobody knows
             handle, self.files[name] = create_temporary(path)
@@ -115,11 +123,12 @@ class AtomicOutputs:
             new = {}
             for name, temporary in self.files.items():
                 path = self.folder / name
+                if _is_special(path):
+                    with temporary.open("rb") as source, _open_special(path) as target:
+                        write_stream(target, iter(lambda: source.read(BLOCK_BYTES), b""), str(path))
+                    continue
                 check_writable(path)
-                if path.exists() and not path.is_file():  # /dev/null, a named pipe
-                    with temporary.open("rb") as source, path.open("wb") as target:
-                        shutil.copyfileobj(source, target, BLOCK_BYTES)
-                elif not path.exists() or not filecmp.cmp(temporary, path, shallow=False):
+                if not path.exists() or not filecmp.cmp(temporary, path, shallow=False):
                     copy_permissions(path, temporary)
                     new[path] = temporary
             _replace_set(new, self.folder / main)

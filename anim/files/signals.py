@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 STOPS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -14,20 +15,22 @@ STOPS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") i
 def hold_signals() -> Iterator[None]:
     """Defer termination signals until the end of the block.
 
-    Only the main thread can, and only it receives them.
+    Only the main thread can, and only it receives them. They take effect after an error of the block, too.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     came: list[int] = []
-    usual = {each: signal.signal(each, lambda number, _: came.append(number)) for each in STOPS}
+    usual: dict[signal.Signals, Any] = {}
     try:
+        for each in STOPS:
+            usual[each] = signal.signal(each, lambda number, _: came.append(number))
         yield
     finally:
         for each, handler in usual.items():
             signal.signal(each, handler)
-    if came:
-        signal.raise_signal(came[0])
+        for number in came:  # the first may be one that is ignored
+            signal.raise_signal(number)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from anim.model import Clip, MeshInstance, MeshPart, PrimitiveRange, Scene, Vert
 from anim.sampling.pose import PosedSkeleton
 from anim.skinning.binding import SkinBinding
 from anim.skinning.bound_mesh import BoundMesh, Make, bind_mesh
-from anim.skinning.chunk_pipeline import ChunkPipeline, packed_size
+from anim.skinning.chunk_pipeline import ChunkPipeline, count_frame_bytes
 from anim.skinning.methods.blended import BlendedMethod
 from anim.skinning.methods.bulge_clamp import BulgeClamp
 from anim.skinning.methods.linear_blend import LinearBlend
@@ -86,7 +86,8 @@ def prepare_bake(
     normals too; of a mesh without them, those of its faces' mean. tangents: unit tangents too, with the handedness in
     the file; all meshes must have them. rigid: meshes without skin and morph targets, too. nodes: only meshes on these.
     threads: None for one per core; the result doesn't depend on it. Raises RangeError for a parameter out of its range,
-    NotFoundError if nothing is left to bake, UnsupportedError for tangents of a mesh without any.
+    NotFoundError if nothing is left to bake, UnsupportedError for tangents of a mesh without any, or for joints beyond
+    the limit of memory.
     """
     check_type(scene, Scene, "scene", help="anim.bake takes an asset")
     _check_indices(nodes, threads)
@@ -103,7 +104,7 @@ def prepare_bake(
         chosen = _wound_as_shown(chosen, rest)
         merged = merge_small_meshes(chosen, scene.skeleton, skinned=method == "lbs")
     bound = _bind_all(bind, merged, make)
-    packed_size(scene.skeleton, bound)  # refuses too many joints before any is posed
+    count_frame_bytes(scene.skeleton, bound)  # refuses too many joints before any is posed
     return Baker(
         scene,
         tuple(chosen),

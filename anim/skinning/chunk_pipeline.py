@@ -26,7 +26,7 @@ MIN_VERTICES = 4096  # per thread
 MAX_VERTICES_ALONE = 4096  # of all frames: to start threads for fewer takes longer than to skin them
 
 
-def packed_size(skeleton: Skeleton, layers: Sequence[BoundMesh]) -> int:
+def count_frame_bytes(skeleton: Skeleton, layers: Sequence[BoundMesh]) -> int:
     """Return the bytes of a frame's matrices and morphed vertices.
 
     Raises UnsupportedError if those of the smallest chunks are above the limit of memory.
@@ -69,7 +69,7 @@ class ChunkPipeline:
                 progress(first)
 
     def _frames_per_chunk(self) -> int:
-        packed = packed_size(self.skeleton, self.layers)
+        packed = count_frame_bytes(self.skeleton, self.layers)
         blocks = min(CHUNK_BYTES // (12 * self.vertices * LANES), PACKED_BYTES // (packed * LANES), MAX_BLOCKS)
         return LANES * max(blocks, 1)
 

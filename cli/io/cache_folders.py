@@ -16,7 +16,7 @@ from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError, not_written
 from anim.files import resolver
-from anim.files.atomic import AtomicOutputs
+from anim.files.atomic import AtomicOutputs, descriptor_of
 from cli.errors import UsageError
 from cli.io import depfile, documents
 
@@ -33,7 +33,7 @@ def inputs(path: str, stack: ExitStack) -> CacheFolder:
 def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     """Return the outputs for `path` and its companion files; `away`: a folder for temporary files."""
     is_pipe = path == documents.PIPE
-    target = resolver.resolve_links(Path(path))
+    target = Path(path) if descriptor_of(Path(path)) is not None else resolver.resolve_links(Path(path))
     folder = Path(away) if dry_run or is_pipe else target.parent
     if not dry_run and not is_pipe:
         depfile.add_output(path)

@@ -268,11 +268,12 @@ def test_stdout_by_its_path_takes_what_stdout_takes(way: str, tmp_path: Path) ->
         ("optimize in.glb o.glb --effort fast -q --report OUT", "/dev/fd/1"),
         ("check in.glb --write-baseline OUT", "/dev/stdout"),
         ("convert in.glb OUT -q", "/dev/fd/3"),
+        ("bake in.glb OUT --fps 4 --clip bend --format npz -q", "/dev/fd/3"),
     ],
 )
 def test_what_is_open_already_is_written_after_what_is_there(line: str, place: str, tmp_path: Path) -> None:
     (tmp_path / "in.glb").write_bytes(built("arm"))
-    alone = "gltf-anim " + line.replace("OUT", "alone.glb" if place.endswith("3") else "alone")
+    alone = "gltf-anim " + line.replace("OUT", "alone.glb" if line.startswith("convert") else "alone")
     expected = shell(f"{alone} >&2 && cat alone*", tmp_path).product()
     command = "gltf-anim " + line.replace("OUT", place)
     done = shell(f"(echo hi; {command}; echo bye) > out 3>&1", tmp_path)

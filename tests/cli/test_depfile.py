@@ -90,6 +90,7 @@ def test_an_input_is_not_replaced(folder: Path, call: Call) -> None:
     assert (run.code, run.text) == (2, "")
     assert "noop.glb: --depfile would replace an input (expected another file)" in run.err
     assert (folder / "noop.glb").read_bytes() == before
+    assert not (folder / "out.glb").exists()
 
 
 def test_none_is_written_without_an_output(folder: Path, call: Call) -> None:

@@ -62,7 +62,7 @@ def _bind_matrices(
     skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]
 ) -> dict[int, Floats]:
     """World bind matrices (3, 4) by joint of a skin."""
-    last = {node: j for j, node in enumerate(held[1].joints.tolist())}  # a file may name a joint many times
+    last = {node: j for j, node in enumerate(held[1].joints.tolist())}  # glTF forbids to repeat a joint
     named = list(last.values())
     joints, inverse = held[1].joints[named], held[1].inverse_bind[named]
     in_mesh = matrix.inverse(inverse)

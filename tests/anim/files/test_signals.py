@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.files import atomic
+from anim.files import atomic, signals
 from anim.files.signals import hold_signals
 
 
@@ -28,6 +28,23 @@ def test_an_interrupt_takes_effect_at_the_end() -> None:
         work()
     assert done
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == usual
+
+
+def test_signals_take_effect_after_an_error_and_after_an_ignored_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = signal.signal(signal.SIGTERM, signal.SIG_IGN)  # as nohup does with SIGHUP
+    monkeypatch.setattr(signals, "STOPS", (signal.SIGINT, signal.SIGTERM))
+
+    def fail() -> None:
+        with hold_signals():
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGINT)
+            raise OSError
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            fail()
+    finally:
+        signal.signal(signal.SIGTERM, usual)
 
 
 def test_a_signal_as_a_temporary_file_is_made_does_not_leave_it(
