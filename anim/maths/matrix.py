@@ -7,6 +7,7 @@ makes sums and products twice as fast.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,11 @@ BLOCK = 65_536  # matrices composed at once, each of about 300 bytes with what c
 
 
 def from_trs(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
-    """Return T·R·S (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4), scale (..., 3)."""
-    result = _by_component(rotation.shape[:-1])
+    """Return T·R·S (..., 3, 4) from translation (..., 3), unit quaternion xyzw (..., 4), scale (..., 3).
+
+    In float32 if all three are.
+    """
+    result = _by_component(rotation.shape[:-1], np.result_type(translation, rotation, scale, np.float32))
     count = math.prod(rotation.shape[:-1])
     if count <= BLOCK:
         _compose_trs(translation, rotation, scale, result)
@@ -122,11 +126,11 @@ def _multiply_columns(above: Floats, own: Floats) -> Floats:
     return product
 
 
-def _by_component(shape: tuple[int, ...]) -> Floats:
+def _by_component(shape: tuple[int, ...], kind: np.dtype[Any]) -> Floats:
     """An empty array (*shape, 3, 4), contiguous over the last axis of `shape`."""
     if not shape:
-        return np.empty((3, 4))
-    return np.swapaxes(np.empty((*shape[:-1], 4, 3, shape[-1])), -1, -3)
+        return np.empty((3, 4), kind)
+    return np.swapaxes(np.empty((*shape[:-1], 4, 3, shape[-1]), kind), -1, -3)
 
 
 def _complete_axes(directions: Floats, scale: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 
+MAX_DOUBLED_VALUES = 3000  # keys of all rows up to which numbers of keys are counted in log2(K) steps
 MAX_STACKED_VALUES = 1_000_000  # pairs of groups × keys of the clips whose tracks are grouped at once
 
 Reaches: TypeAlias = tuple[Ints, Floats]
@@ -32,13 +33,30 @@ def num_keys(reach: Ints, last: Ints) -> Ints:
 
     ([[1 3 3 3]], [3]) → [3]: keys 0, 1 and 3
     """
-    flat, first = reach.reshape(-1), np.arange(0, reach.size, reach.shape[-1])
+    first = np.arange(0, reach.size, reach.shape[-1])
     end = np.broadcast_to(last, reach.shape[:-1]).reshape(-1)
-    at, count = np.zeros(len(first), np.int64), np.ones(len(first), np.int64)
+    count_keys = _count_by_doubling if reach.size <= MAX_DOUBLED_VALUES else _count_by_steps
+    return count_keys(reach.reshape(-1), first, end).reshape(reach.shape[:-1])
+
+
+def _count_by_steps(reach: Ints, first: Ints, end: Ints) -> Ints:
+    """The numbers of keys of rows that start at `first`, from key to key."""
+    at, count = np.zeros_like(first), np.ones_like(first)
     while (going := at < end).any():
-        at = flat[first + at]
+        at = reach[first + at]
         count += going
-    return count.reshape(reach.shape[:-1])
+    return count
+
+
+def _count_by_doubling(reach: Ints, first: Ints, end: Ints) -> Ints:
+    """The same in log2(K) steps, each of twice as many keys from every key: fewer calls for few rows."""
+    length = len(reach) // max(len(first), 1)
+    ahead = (np.minimum(reach.reshape(len(first), length), end[:, None]) + first[:, None]).reshape(-1)
+    passed = (ahead > np.arange(len(ahead))).astype(np.int64)
+    for _ in range((length - 1).bit_length()):
+        passed += passed[ahead]
+        ahead = ahead[ahead]
+    return 1 + passed[first]
 
 
 def _stackable(asked: Sequence[Reaches]) -> Iterator[list[Reaches]]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from anim.arrays import Floats, Ints
+from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
 from anim.optimization.options import Bounds
@@ -17,6 +20,17 @@ from anim.optimization.search.stacked_clips import StackedClips, take_clips
 MIN_INTERVAL_S = 1e-4  # s; minimum time step of a speed
 MAX_BLOCK_MATRICES = 100_000  # world matrices of nodes at a time: 10 MB; more are measured in blocks of times
 MIN_BLOCK_TIMES = 64
+# A clip is measured in float32, in half the time, where its bounds are this many rounding errors of its positions.
+MIN_ROUNDINGS = 4000
+
+
+class _SourceMatrices(NamedTuple):
+    """Columns of matrices of the source in one type, as of `StackedClips`, of nodes above points only."""
+
+    columns: AnyArray
+    by_chord: AnyArray
+    varying: AnyArray
+    constant: AnyArray
 
 
 class BoundUsage:
@@ -45,18 +59,18 @@ class BoundUsage:
         self._moving_places = place[clips.moving[self._moving]]
         varying, constant = (np.flatnonzero(place[nodes] >= 0) for nodes in (clips.varying, clips.constant))
         self._varying_places, self._constant_places = place[clips.varying[varying]], place[clips.constant[constant]]
-        self._varying_matrices, self._constant_matrices = (
-            clips.varying_matrices[varying],
-            clips.constant_matrices[constant],
+        self._source = _SourceMatrices(
+            clips.columns, clips.by_chord, clips.varying_matrices[varying], clips.constant_matrices[constant]
         )
+        self._is_single = self._fits_single()
 
     def slerp_raw(self, shown: Sequence[Floats], clips: Ints) -> Floats:
         """Return the bound usage (P, b) of each point in `clips` (b,), for players with slerp."""
-        return self._usage(shown, self._clips.columns, clips)
+        return self._usage(shown, "columns", clips)
 
     def nlerp(self, shown: Sequence[Floats], clips: Ints) -> Floats:
         """Return the same for players with component-wise interpolation, against the source played by them."""
-        return self._usage(shown, self._clips.by_chord, clips)
+        return self._usage(shown, "by_chord", clips)
 
     def own(self, shown: Sequence[Floats], clips: Ints) -> list[Floats]:
         """Return the fraction of the angle bound that each track (G,) of each clip uses: errors of ancestors add up."""
@@ -77,20 +91,47 @@ class BoundUsage:
             own[b][turning] = turned[self._clips.node[some][turning], b] / self._bounds.max_angle
         return own
 
-    def _usage(self, shown: Sequence[Floats], columns: Floats, clips: Ints) -> Floats:
+    def _fits_single(self) -> Bools:
+        """Whether each clip (B,) may be measured in float32, by its own motion and bounds."""
+        columns = np.abs(self._source.columns).max(axis=(1, 3), initial=0.0).reshape(-1, 4, len(self._clips.sources))
+        farthest = np.abs(self._clips.points.factors[..., :3]).max(initial=0.0)
+        reach = columns[:, :3].max(axis=(0, 1), initial=0.0) * farthest + columns[:, 3].max(axis=0, initial=0.0)
+        smallest = self._allowed.min(axis=0, initial=np.inf)
+        if self._bounds.max_speed_error is not None:
+            smallest = np.minimum(smallest, self._bounds.max_speed_error * MIN_INTERVAL_S)
+        return np.asarray(smallest >= MIN_ROUNDINGS * np.finfo(np.float32).eps * reach)
+
+    @cached_property
+    def _single_source(self) -> _SourceMatrices:
+        return _SourceMatrices(*(each.astype(np.float32) for each in self._source))
+
+    def _usage(self, shown: Sequence[Floats], name: str, clips: Ints) -> Floats:
+        """The bound usage (P, b) against the columns `name` of the source."""
+        usage = np.empty((len(self._clips.points), len(clips)))
+        is_single = self._is_single[clips]
+        for single in np.unique(is_single).tolist():
+            some = np.flatnonzero(is_single == single)
+            source = self._single_source if single else self._source
+            parts = [take_clips(part, some, 2) for part in shown]
+            usage[:, some] = self._usage_in_blocks(parts, source, getattr(source, name), clips[some])
+        return usage
+
+    def _usage_in_blocks(
+        self, shown: Sequence[Floats], source: _SourceMatrices, columns: AnyArray, clips: Ints
+    ) -> Floats:
         count = max(_block_times(len(self._skeleton)) // len(clips), 2)
         length = self._clips.at.shape[1]
-        if length <= count:
-            return self._usage_over(slice(None), shown, columns, clips)
         # each block has one time of the block before, from which speeds are measured
         blocks = [slice(max(first - 1, 0), first + count) for first in range(0, length, count)]
-        found = [self._usage_over(times, shown, columns, clips) for times in blocks]
+        found = [self._usage_over(times, shown, source, columns, clips) for times in blocks]
         return np.asarray(np.max(found, axis=0))
 
-    def _usage_over(self, times: slice, shown: Sequence[Floats], columns: Floats, clips: Ints) -> Floats:
+    def _usage_over(
+        self, times: slice, shown: Sequence[Floats], source: _SourceMatrices, columns: AnyArray, clips: Ints
+    ) -> Floats:
         """The bound usage at some of the measurement times."""
         at = self._clips.at[clips, times]
-        world = self._world([part[..., times] for part in shown], times, clips)
+        world = self._world([part[..., times] for part in shown], times, source, clips)
         change = world[self._point_places].reshape(-1, 3 * at.size)
         change -= take_clips(columns[..., times], clips, 2).reshape(change.shape)
         most, gaps = self._bounds.max_speed_error, np.maximum(np.diff(at), MIN_INTERVAL_S).astype(np.float32)
@@ -101,15 +142,16 @@ class BoundUsage:
             usage[rows] = np.maximum(_longest(moved) / self._allowed[rows][:, clips], speeds)
         return usage
 
-    def _world(self, shown: Sequence[Floats], times: slice, clips: Ints) -> Floats:
+    def _world(self, shown: Sequence[Floats], times: slice, source: _SourceMatrices, clips: Ints) -> AnyArray:
         """Columns (n, 4, 3, b · W) of the world matrices of nodes above points; only those with tracks are composed."""
-        parts = [part[:, self._moving] for part in shown]
+        kind = source.columns.dtype
+        parts = [part[:, self._moving].astype(kind, copy=False) for part in shown]
         frames = parts[0].shape[2] * parts[0].shape[3]
         moving = matrix.from_trs(*(np.moveaxis(part.reshape(*part.shape[:2], frames), 0, 2) for part in parts))
-        local = np.empty((len(self._parents), 4, 3, frames))
-        varying = take_clips(self._varying_matrices[..., times], clips, 3)
+        local: NDArray[Any] = np.empty((len(self._parents), 4, 3, frames), kind)
+        varying = take_clips(source.varying[..., times], clips, 3)
         local[self._varying_places] = varying.reshape(*varying.shape[:3], frames)
-        local[self._constant_places] = self._constant_matrices[..., None]
+        local[self._constant_places] = source.constant[..., None]
         local[self._moving_places] = moving.transpose(0, 3, 2, 1)
         world = matrix.accumulate_world(local.transpose(0, 3, 2, 1), self._parents, self._levels, in_place=True)
         return world.transpose(0, 3, 2, 1)

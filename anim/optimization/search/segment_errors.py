@@ -16,6 +16,7 @@ SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those o
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
 MAX_STACKED_VALUES = 30_000  # tracks × keys tabulated in the same arrays, each 32 bytes in each of three arrays
 MAX_JOINT_TABLE_VALUES = 1_000_000  # of several tables in one search: 4 MB
+MAX_COPIED_VALUES = 4_000_000  # of a table that is copied for faster maxima over groups: 16 MB
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
 
@@ -38,37 +39,46 @@ class Tabulated(NamedTuple):
 class SegmentErrors:
     """Largest errors of linear segments between all pairs of K keys up to a second apart, for G tracks.
 
-    errors: (span, K, G) m: at [n, e, g] the largest distance from the line between keys e - n - 1 and e; infinite
+    errors: (G, K, span) m: at [g, e, n] the largest distance from the line between keys e - n - 1 and e; infinite
     without such a key.
     """
 
     def __init__(self, errors: NDArray[np.float32]) -> None:
-        self._errors = errors.transpose(1, 2, 0)
+        self._errors = errors
 
     def __len__(self) -> int:
         """Return the number of keys of each track."""
-        return len(self._errors)
+        return self._errors.shape[1]
 
     @property
     def span(self) -> int:
         """The most intervals that a segment covers."""
-        return int(self._errors.shape[2])
+        return self._errors.shape[2]
 
     def costs(self, tracks: Ints, budgets: Floats, ends: slice = slice(None)) -> NDArray[np.float32]:
         """Return the costs (K, k, span) of segments that end at each key of the `tracks` (k,) under budgets (k,) in m.
 
         About 1 within the budget, inf above it and where there is no segment. ends: some of the keys.
         """
-        return _costs(self._errors[ends, tracks] * (1 / budgets).astype(np.float32)[:, None])
+        return _costs(self._shares(tracks, budgets, ends)).transpose(1, 0, 2)
 
     def shared_costs(self, groups: Sequence[Ints], budgets: Floats) -> NDArray[np.float32]:
         """Return the costs (K, A, span) of segments that all tracks of a group have in common, as of `costs`.
 
         groups: A groups of k tracks in all. budgets: (k,) m, in their order.
         """
-        shares = self._errors[:, np.concatenate(groups)] * (1 / budgets).astype(np.float32)[:, None]
-        firsts = np.cumsum([0, *map(len, groups[:-1])])
-        return _costs(np.maximum.reduceat(shares, firsts, axis=1))
+        shares = self._shares(np.concatenate(groups), budgets)
+        largest = np.empty((len(self), len(groups), self.span), np.float32)
+        ends = np.cumsum([len(each) for each in groups]).tolist()
+        for n, (each, end) in enumerate(zip(groups, ends, strict=True)):
+            shares[end - len(each) : end].max(axis=0, out=largest[:, n])
+        return _costs(largest)
+
+    def _shares(self, tracks: Ints, budgets: Floats, ends: slice = slice(None)) -> NDArray[np.float32]:
+        """Errors (k, K, span) of some tracks as fractions of their budgets (k,) in m."""
+        shares = self._errors[tracks, ends]
+        shares *= (1 / budgets).astype(np.float32)[:, None, None]
+        return shares
 
     def reach(self, tracks: Ints, budgets: Floats) -> Ints:
         """Return for each key (k, K) of the `tracks` (k,) the last one that a segment reaches under budgets (k,) in m.
@@ -82,10 +92,10 @@ class SegmentErrors:
     @cached_property
     def _largest(self) -> NDArray[np.float32]:
         """[n, s, g]: the largest error of the segments from key s over 2 … n + 2 intervals; infinite past the end."""
-        count, tracks, span = self._errors.shape
+        tracks, count, span = self._errors.shape
         largest = np.full((span - 1, count, tracks), np.inf, np.float32)
         for n in range(1, min(span, count - 1)):
-            largest[n - 1, : count - n - 1] = self._errors[n + 1 :, :, n]
+            largest[n - 1, : count - n - 1] = self._errors[:, n + 1 :, n].T
         return np.asarray(np.maximum.accumulate(largest, axis=0))
 
 
@@ -120,10 +130,11 @@ def _tabulate(asked: Sequence[Tabulated]) -> list[SegmentErrors]:
     lengths = [0] * len(asked)
     clip, track = np.repeat(np.arange(len(asked)), tracks), np.concatenate([np.arange(count) for count in tracks])
     components, times = _padded(asked)
-    length = 0
+    squares: list[Floats] = []  # by length: of the distances between keys
     while len(clip):
-        length += 1
-        errors = _segment_errors(components, times, clip, length)
+        squares.append(_squared_distances(components, len(squares) + 1))
+        length = len(squares)
+        errors = _segment_errors(squares, times, clip)
         edges = np.searchsorted(clip, np.arange(len(asked) + 1)).tolist()
         for n, (table, first, end) in enumerate(zip(tables, edges, edges[1:], strict=False)):
             if first < end:
@@ -134,7 +145,14 @@ def _tabulate(asked: Sequence[Tabulated]) -> list[SegmentErrors]:
         kept = (errors <= limits[clip, None]).any(axis=1) & (spans[clip] > length)
         if not kept.all():
             clip, track, components = clip[kept], track[kept], components[:, kept]
-    return [SegmentErrors(table[:longest]) for table, longest in zip(tables, lengths, strict=True)]
+            squares = [each[kept] for each in squares]
+    return [SegmentErrors(_by_track(table[:longest])) for table, longest in zip(tables, lengths, strict=True)]
+
+
+def _by_track(table: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The errors (G, K, span) of a table (span, K, G); contiguous for each track unless a copy would be large."""
+    errors = table.transpose(2, 1, 0)
+    return np.ascontiguousarray(errors) if errors.size <= MAX_COPIED_VALUES else errors
 
 
 def _padded(asked: Sequence[Tabulated]) -> tuple[Floats, Floats]:
@@ -257,29 +275,39 @@ def _span(times: Floats) -> int:
     return max(min(max(per_second, SPAN_RANGE[0]), SPAN_RANGE[1], len(times) - 1), 1)
 
 
-def _segment_errors(values: Floats, times: Floats, clip: Ints, length: int) -> Floats:
-    """Errors (G, K - length) of segments over `length` intervals, 0 for neighbors.
+def _squared_distances(values: Floats, length: int) -> Floats:
+    """Squared distances (G, K - length) of keys `length` intervals apart. values: (C, G, K)."""
+    away = values[..., length:] - values[..., : values.shape[2] - length]
+    away *= away
+    total = away[0]
+    for each in away[1:]:
+        total += each
+    return total
 
-    values: (C, G, K). times: (B, K) s. clip: (G,) index of each track's times.
+
+def _segment_errors(squares: Sequence[Floats], times: Floats, clip: Ints) -> Floats:
+    """Errors (G, K - n) of the segments over n intervals, 0 for neighbors.
+
+    squares: n arrays (G, K - 1) … (G, K - n), the squared distances of keys 1 … n intervals apart. times: (B, K) s.
+    clip: (G,) index of each track's times.
+
+    Three distances give that of a key from the line at its time, by Stewart's theorem: (1 - u) a² + u b² - u (1 - u) c²,
+    a and b from the ends of the segment, c between these, whatever the number of components.
     """
-    starts = values.shape[2] - length
-    largest = np.zeros((values.shape[1], starts))
-    a = values[..., :starts]
-    change = values[..., length:] - a
-    if length == 1:
-        return np.where(np.isnan(change[0]), np.nan, 0.0)
-    whole = times[:, length:] - times[:, :starts]
-    error = np.empty_like(change)
+    whole, length = squares[-1], len(squares)
+    starts = whole.shape[1]
+    largest = np.where(np.isnan(whole), np.nan, 0.0)
+    part = np.empty_like(whole)
+    duration = times[:, length:] - times[:, :starts]
     for inner in range(1, length):
-        u = (times[:, inner : inner + starts] - times[:, :starts]) / whole
-        np.multiply(u[clip] if len(u) > 1 else u, change, out=error)
-        error += a
-        error -= values[..., inner : inner + starts]
-        error *= error
-        total = error[0]
-        for each in error[1:]:
-            total += each
-        np.maximum(largest, total, out=largest)
+        u = (times[:, inner : inner + starts] - times[:, :starts]) / duration
+        u = u[clip] if len(u) > 1 else u
+        error = u * squares[length - inner - 1][:, inner:]
+        u_of_start = 1 - u
+        error += np.multiply(u_of_start, squares[inner - 1][:, :starts], out=part)
+        u_of_start *= u
+        error -= np.multiply(u_of_start, whole, out=part)
+        np.maximum(largest, error, out=largest)
     return np.asarray(np.sqrt(largest))
 
 

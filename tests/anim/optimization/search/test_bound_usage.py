@@ -12,7 +12,7 @@ from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.optimization.options import Bounds
 from anim.optimization.search import bound_usage
-from anim.optimization.search.bound_usage import MIN_INTERVAL_S, BoundUsage
+from anim.optimization.search.bound_usage import MIN_INTERVAL_S, MIN_ROUNDINGS, BoundUsage
 from anim.optimization.search.playback import level_world_matrices
 from anim.optimization.search.source_motion import PATHS, SourceMotion
 from anim.optimization.search.stacked_clips import StackedClips
@@ -24,6 +24,7 @@ ALLOWED = np.random.default_rng(11).uniform(0.5, 2, (len(POINTS), len(CLIPS)))
 LEVELS = OF.skeleton.levels()
 EVERY = np.arange(len(CLIPS))
 SPEED = Bounds(0.1, 0.0, max_speed_error=0.3)
+SINGLE = 4 / MIN_ROUNDINGS  # of the bound: rounding of positions in float32
 ANGLE = Bounds(0.1, 0.0, max_angle=math.radians(0.5))
 
 
@@ -70,8 +71,8 @@ def test_the_largest_distance_of_each_point() -> None:
     assert found.shape == ALLOWED.shape
     for b, source in enumerate(_truths()):
         expected = np.linalg.norm(_moves(source, changed[b]), axis=2).max(axis=1) / ALLOWED[:, b]
-        assert found[:, b] == pytest.approx(expected, rel=1e-5)
-    assert usage.slerp_raw(clips.local, EVERY).max() < 1e-12
+        assert found[:, b] == pytest.approx(expected, rel=1e-5, abs=SINGLE)
+    assert usage.slerp_raw(clips.local, EVERY).max() < SINGLE
 
 
 def test_speeds_count_where_they_are_bounded() -> None:
@@ -124,9 +125,21 @@ def test_padding_and_other_clips_change_no_usage(some: list[int], bounds: Bounds
         alone = BoundUsage(OF.skeleton, single, ALLOWED[:, b : b + 1], bounds)
         there, one = _stacked(single, [changed[b]]), np.array([0])
         for each, play in zip(found, (alone.slerp_raw, alone.nlerp), strict=True):
-            assert each[:, n] == pytest.approx(play(there, one)[:, 0], rel=1e-5)
+            assert each[:, n] == pytest.approx(play(there, one)[:, 0], rel=1e-5, abs=SINGLE)
         assert own[n] == pytest.approx(alone.own(there, one)[0], rel=1e-12)
         assert own[n].any() == (bounds is ANGLE)
+
+
+def test_clips_with_wide_bounds_are_measured_in_float32(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each by its own bounds: narrow ones need float64, in which the same error is found."""
+    changed = [_changed(source, b) for b, source in enumerate(_truths())]
+    clips = stack(*CLIPS)
+    shown, far = _stacked(clips, changed), ALLOWED * [1, 1e-5, 1]
+    mixed = BoundUsage(OF.skeleton, clips, far, Bounds(0.1, 0.0)).slerp_raw(shown, EVERY)
+    monkeypatch.setattr(bound_usage, "MIN_ROUNDINGS", np.inf)
+    exact = BoundUsage(OF.skeleton, clips, far, Bounds(0.1, 0.0)).slerp_raw(shown, EVERY)
+    assert mixed == pytest.approx(exact, rel=1e-5, abs=SINGLE)
+    assert (mixed != exact).any(axis=0).tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize("length", [1, 2, 7])

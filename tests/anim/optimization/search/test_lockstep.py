@@ -49,7 +49,7 @@ def _same(some: SearchResult | None, other: SearchResult | None) -> None:
         assert (keys.form, keys.codes) == (b.keys[i].form, b.keys[i].codes)
         np.testing.assert_array_equal(keys.values, b.keys[i].values)
     assert {i: on.tolist() for i, on in a.on.items()} == {i: on.tolist() for i, on in b.on.items()}
-    assert a.usage == pytest.approx(b.usage, rel=1e-4, abs=1e-9)
+    assert a.usage == pytest.approx(b.usage, rel=1e-4, abs=1e-4)
     assert a.own == pytest.approx(b.own, rel=1e-9)
     assert a.plan.budgets == pytest.approx(b.plan.budgets, rel=1e-4)
 

@@ -44,7 +44,7 @@ def test_errors_of_tracks_do_not_depend_on_those_beside(values: int, monkeypatch
     alone = [tabulate([each])[0] for each in _tabulated()]
     monkeypatch.setattr(segment_errors, "MAX_STACKED_VALUES", values)
     for one, other in zip(tabulate(_tabulated()), alone, strict=True):
-        budgets = np.ones(one._errors.shape[1])
+        budgets = np.ones(len(one._errors))
         found, expected = (each.costs(np.arange(len(budgets)), budgets) for each in (one, other))
         np.testing.assert_array_equal(found, expected)
     assert len({each.span for each in alone}) > 4
@@ -60,7 +60,7 @@ def test_errors_are_those_of_interpolation() -> None:
                     some = slice(end - n, end + 1)
                     line = np.stack([np.interp(times[some], times[[end - n, end]], c[[end - n, end]]) for c in value.T])
                     expected = np.linalg.norm(line.T - value[some], axis=1).max()
-                    assert table._errors[end, track, n - 1] == pytest.approx(expected, rel=1e-5, abs=1e-6)
+                    assert table._errors[track, end, n - 1] == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
 
 def _plain(table: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:

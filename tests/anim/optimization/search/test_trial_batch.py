@@ -31,7 +31,7 @@ def _same(some: TrialResult | None, other: TrialResult | None) -> None:
         assert (keys.form, keys.codes) == (other.keys[i].form, other.keys[i].codes)
         np.testing.assert_array_equal(keys.values, other.keys[i].values)
     assert {i: on.tolist() for i, on in some.on.items()} == {i: on.tolist() for i, on in other.on.items()}
-    assert some.usage == pytest.approx(other.usage, rel=1e-4, abs=1e-6)
+    assert some.usage == pytest.approx(other.usage, rel=1e-4, abs=1e-4)
     assert some.own == pytest.approx(other.own, rel=1e-9)
 
 
