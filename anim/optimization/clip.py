@@ -13,9 +13,9 @@ from anim.model import FLOAT32, Clip, Interpolation, TimeAxis, Track, parse_weig
 from anim.model.track import share_time_axes
 from anim.optimization.options import Drop, Policy
 from anim.optimization.search.context import Context
-from anim.optimization.search.lockstep import SearchRequest, SearchResult
-from anim.optimization.search.plan import Solution, TrackAction, TrialResult, value_bytes
-from anim.optimization.search.source_motion import PATHS, SourceMotion, key_grid
+from anim.optimization.search.lockstep import SearchRequest
+from anim.optimization.search.plan import FoundKeys, Solution, TrackAction, value_bytes
+from anim.optimization.search.source_motion import PATHS, key_grid
 from anim.optimization.tracks import clip_ends, key_reduction, morph_weights, quantization
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
@@ -50,7 +50,7 @@ class Task:
         return policy.drop is Drop.REST or (policy.drop is Drop.UNUSED and self.unused[i])
 
 
-Solving: TypeAlias = Generator[SearchRequest, SearchResult | None, Solution | None]
+Solving: TypeAlias = Generator[SearchRequest, FoundKeys | None, Solution | None]
 
 
 def solve(context: Context, task: Task) -> Solving:
@@ -224,7 +224,7 @@ class _TrackSorter:
 
     def _search(
         self, free: Sequence[int]
-    ) -> Generator[SearchRequest, SearchResult | None, dict[int, tuple[Track, EncodedKeys]] | None]:
+    ) -> Generator[SearchRequest, FoundKeys | None, dict[int, tuple[Track, EncodedKeys]] | None]:
         """Search the free tracks; None without a solution. Tracks that the search drops are absent."""
         if not free:
             return {}
@@ -237,22 +237,22 @@ class _TrackSorter:
             tuple(self._task.shared[i] for i in free),
             self._task.extra,
         )
-        return None if found is None else _tracks(self._clip, found.source, found.result)
+        return None if found is None else _tracks(self._clip, found)
 
 
-def _tracks(clip: Clip, found: SourceMotion, outcome: TrialResult) -> dict[int, tuple[Track, EncodedKeys]]:
+def _tracks(clip: Clip, found: FoundKeys) -> dict[int, tuple[Track, EncodedKeys]]:
     axes: dict[bytes, TimeAxis] = {}
     result = {}
-    for k, moving in enumerate(found.moving):
-        if outcome.actions[k] == TrackAction.DROPPED:
+    for k, index in enumerate(found.tracks):
+        if found.actions[k] == TrackAction.DROPPED:
             continue
-        stored = outcome.keys[k]
-        if k in outcome.on:
-            keys = outcome.on[k]
+        stored = found.keys[k]
+        if k in found.on:
+            keys = found.on[k]
             at = axes.setdefault(keys.tobytes(), TimeAxis(times.key_times(found.grid[keys])))
         else:
             at = axes.setdefault(b"", TimeAxis(times.key_times(np.array([clip.start]))))
-        result[moving.index] = _new_track(clip.tracks[moving.index], at, stored), stored
+        result[index] = _new_track(clip.tracks[index], at, stored), stored
     return result
 
 

@@ -15,8 +15,9 @@ from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Effort, Request
 from anim.optimization.search.context import Context, build_context
-from anim.optimization.search.lockstep import SearchRequest, SearchResult, search_clips
-from anim.optimization.search.plan import Solution
+from anim.optimization.search.lockstep import SearchRequest
+from anim.optimization.search.long_clips import search_all
+from anim.optimization.search.plan import FoundKeys, Solution
 from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
@@ -164,15 +165,13 @@ def optimize_clips(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) 
     return [found[n] for n in range(len(steps))]
 
 
-def _search(
-    optimizer: ClipOptimizer, asked: Mapping[int, tuple[Effort, SearchRequest]]
-) -> dict[int, SearchResult | None]:
+def _search(optimizer: ClipOptimizer, asked: Mapping[int, tuple[Effort, SearchRequest]]) -> dict[int, FoundKeys | None]:
     """The result of each search; those with equal efforts run side by side, on the points that any of them needs."""
-    answers: dict[int, SearchResult | None] = {}
+    answers: dict[int, FoundKeys | None] = {}
     for effort in dict.fromkeys(effort for effort, _ in asked.values()):
         some = {n: request for n, (one, request) in asked.items() if one == effort}
         extra = frozenset().union(*(request.extra for request in some.values()))
-        answers.update(zip(some, search_clips(optimizer.context(extra), list(some.values()), effort), strict=True))
+        answers.update(zip(some, search_all(optimizer.context(extra), list(some.values()), effort), strict=True))
     return answers
 
 
@@ -204,7 +203,7 @@ def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[C
 def _solve(context: Context, task: Task, effort: Effort) -> Optimizing[Solution | None]:
     """The solution of a clip, whose searches are yielded with their effort."""
     steps = solve(context, task)
-    answer: SearchResult | None = None
+    answer: FoundKeys | None = None
     while True:
         try:
             request = steps.send(answer)

@@ -29,7 +29,7 @@ MAX_REFINED_DEPTH = 256  # levels of the metric's skeletons; bounds of deeper on
 PLAYER_ORDER = ("spec", "raw", "three", "nlerp")  # players with normalized arcs are adjacent
 LARGE_SKELETON = 1000  # moving nodes; from here on a step is LARGE_STEP_FRACTION as long, for memory
 LARGE_STEP_FRACTION = 0.5
-BLOCK = 250_000  # players × intervals × groups and nodes per step, each up to 800 bytes
+BLOCK = 100_000  # players × intervals × groups and nodes per step, each about 1 kB
 
 
 class Proof(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 
-MAX_DOUBLED_VALUES = 3000  # keys of all rows up to which numbers of keys are counted in log2(K) steps
+MAX_SMALL_VALUES = 3000  # keys of all rows up to which numbers of keys are counted in log2(K) steps
 MAX_STACKED_VALUES = 1_000_000  # pairs of groups × keys of the clips whose tracks are grouped at once
 
 Reaches: TypeAlias = tuple[Ints, Floats]
@@ -35,7 +35,7 @@ def num_keys(reach: Ints, last: Ints) -> Ints:
     """
     first = np.arange(0, reach.size, reach.shape[-1])
     end = np.broadcast_to(last, reach.shape[:-1]).reshape(-1)
-    count_keys = _count_by_doubling if reach.size <= MAX_DOUBLED_VALUES else _count_by_steps
+    count_keys = _count_by_doubling if reach.size <= MAX_SMALL_VALUES else _count_by_steps
     return count_keys(reach.reshape(-1), first, end).reshape(reach.shape[:-1])
 
 

@@ -92,7 +92,7 @@ class BoundUsage:
         return own
 
     def _fits_single(self) -> Bools:
-        """Whether each clip (B,) may be measured in float32, by its own motion and bounds."""
+        """Mask (B,) of the clips that may be measured in float32, by their own motion and bounds."""
         columns = np.abs(self._source.columns).max(axis=(1, 3), initial=0.0).reshape(-1, 4, len(self._clips.sources))
         farthest = np.abs(self._clips.points.factors[..., :3]).max(initial=0.0)
         reach = columns[:, :3].max(axis=(0, 1), initial=0.0) * farthest + columns[:, 3].max(axis=0, initial=0.0)

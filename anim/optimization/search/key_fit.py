@@ -74,13 +74,12 @@ class KeyFit:
     def _solve(self, right: Floats, axis_of: Ints) -> Floats:
         """Keys (C, T, K) from the right sides of the normal equations: hat functions overlap only their neighbors'."""
         is_long = self._axes.counts[axis_of] > MAX_UNBANDED_KEYS
-        if is_long.any():
-            found = self._solve_banded(right, axis_of, is_long)
+        if right.shape[2] > MAX_UNBANDED_KEYS:  # of some axis, not always one of these tracks'
+            solved = self._solve_banded(right, axis_of, is_long)
             if not is_long.all():
-                found[:, ~is_long, :MAX_UNBANDED_KEYS] = self._solve(
-                    right[:, ~is_long, :MAX_UNBANDED_KEYS], axis_of[~is_long]
-                )
-            return found
+                short = right[:, ~is_long, :MAX_UNBANDED_KEYS]
+                solved[:, ~is_long, :MAX_UNBANDED_KEYS] = self._solve(short, axis_of[~is_long])
+            return solved
         pivots, factors = self._factors
         found = np.ascontiguousarray(np.moveaxis(right, 2, 0))  # (K, C, T)
         factor = np.ascontiguousarray(factors[: len(found) - 1, axis_of])

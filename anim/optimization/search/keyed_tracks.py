@@ -50,6 +50,7 @@ class KeyedTracks:
         self._packing = packing
         self._moving = [each for source in clips.sources for each in source.moving]
         self._closures = np.array([each.closure for each in self._moving])
+        self._is_part = np.array([source.is_part for source in clips.sources])[clips.clip]
         self._grid_sizes = np.array([len(source.grid) for source in clips.sources])[clips.clip]
 
     def on(self, axes: Sequence[tuple[int, Sequence[SharedAxis]]]) -> KeyedAxes:
@@ -89,6 +90,8 @@ class KeyedTracks:
         keys = self._fit(tracks, values, axes)
         counts = axes.intervals.counts[axis_of]
         close_ends(keys, self._closures[tracks], counts)
+        if (fixed := np.flatnonzero(self._is_part[tracks])).size:
+            _fix_ends(keys, values, fixed, axes.intervals.at[axis_of[fixed]], counts[fixed])
         paths = [self._moving[i].path for i in tracks.tolist()]
         stored, keys = quantization.encode_stack(
             keys, counts.tolist(), paths, tolerances[tracks].tolist(), self._packing
@@ -112,3 +115,10 @@ class KeyedTracks:
             fitted = axes.fit.vectors(values, axis_of)
         fitted[:, is_full] = keys[:, is_full]
         return fitted
+
+
+def _fix_ends(keys: Floats, values: Floats, tracks: Ints, at: Ints, counts: Ints) -> None:
+    """Give the first and last keys of some tracks (t,) the values (C, T, W) there. at: (t, K). counts: (t,) keys."""
+    last = counts - 1
+    keys[:, tracks, 0] = values[:, tracks, at[:, 0]]
+    keys[:, tracks, last] = values[:, tracks, at[np.arange(len(at)), last]]

@@ -13,7 +13,7 @@ from anim.model import Clip
 from anim.optimization.options import Effort
 from anim.optimization.search.bound_usage import BoundUsage
 from anim.optimization.search.context import Context
-from anim.optimization.search.plan import TrialResult
+from anim.optimization.search.plan import FoundKeys, Groups, TrialResult
 from anim.optimization.search.search import Search, search
 from anim.optimization.search.source_analysis import FreeTracks, analyze_sources
 from anim.optimization.search.source_motion import SourceMotion
@@ -22,12 +22,23 @@ from anim.optimization.search.trial import ClipTrials, Trial
 from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION, TrialBatch
 
 
+class ClipPart(NamedTuple):
+    """A part of a long clip: all tracks with keys have one at its first and last time, with the source's values.
+
+    grid: (K,) s, its possible key times. groups: of free tracks that share a time axis; empty to find them.
+    """
+
+    grid: Floats
+    groups: Groups
+
+
 class SearchRequest(NamedTuple):
     """A clip to search.
 
     free: indices of the tracks that may change. bound: m, error bound. spent: m, the part of it that other tracks use.
     droppable: (free tracks) whether each may be dropped. shared: per free track, constants of other clips, the most
-    frequent first. extra: further points to measure, (index of the surface, index of the vertex).
+    frequent first. extra: further points to measure, (index of the surface, index of the vertex). part: the part of a
+    long clip to search, None for all of it.
     """
 
     clip: Clip
@@ -37,6 +48,7 @@ class SearchRequest(NamedTuple):
     droppable: Bools
     shared: tuple[Sequence[Floats], ...]
     extra: frozenset[tuple[int, int]]
+    part: ClipPart | None = None
 
 
 class SearchResult(NamedTuple):
@@ -44,6 +56,12 @@ class SearchResult(NamedTuple):
 
     source: SourceMotion
     result: TrialResult
+
+    @property
+    def found(self) -> FoundKeys:
+        """The keys, without what else is known of the motion."""
+        tracks = tuple(each.index for each in self.source.moving)
+        return FoundKeys(self.source.grid, tracks, self.result.actions, self.result.keys, self.result.on)
 
 
 def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[SearchResult | None]:
@@ -57,7 +75,7 @@ def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Ef
     usage = BoundUsage(context.skeleton, clips, allowed, context.bounds)
     batch = TrialBatch(context.skeleton, clips, trials, usage, context.coding)
     searches = [
-        search(source, each.bound, effort, partial(batch.leeway, n))
+        search(source, each.bound, effort, partial(batch.leeway, n), each.part.groups if each.part else ())
         for n, (source, each) in enumerate(zip(clips.sources, requests, strict=True))
     ]
     best = run_searches(batch, searches)
@@ -70,7 +88,10 @@ def search_clips(context: Context, requests: Sequence[SearchRequest], effort: Ef
 def _analyze(context: Context, requests: Sequence[SearchRequest]) -> list[SourceMotion]:
     return analyze_sources(
         context.skeleton,
-        [FreeTracks(each.clip, each.free, CHORD_BOUND_FRACTION * each.bound) for each in requests],
+        [
+            FreeTracks(each.clip, each.free, CHORD_BOUND_FRACTION * each.bound, each.part and each.part.grid)
+            for each in requests
+        ],
         context.points,
         context.answering,
         reference=context.policy.reference,

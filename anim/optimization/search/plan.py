@@ -81,6 +81,21 @@ class TrialResult:
 
 
 @dataclass(frozen=True, slots=True)
+class FoundKeys:
+    """Keys that a search found for G tracks of a clip.
+
+    grid: (K,) s, possible key times. tracks: (G) indices in the clip. actions: (G,). keys: by position in `tracks`, as
+    stored; none for dropped tracks. on: by position of keyed tracks, mask (K,) of their times on the grid.
+    """
+
+    grid: Floats
+    tracks: tuple[int, ...]
+    actions: Ints
+    keys: Mapping[int, EncodedKeys]
+    on: Mapping[int, Bools]
+
+
+@dataclass(frozen=True, slots=True)
 class Solution:
     """A clip in fewer bytes.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.optimization.options import Effort
-from anim.optimization.search.plan import Plan, RotationTarget, TrialResult
+from anim.optimization.search.plan import Groups, Plan, RotationTarget, TrialResult
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.search.time_axes import GROUPING_LAYOUTS
 from anim.optimization.search.trial import Trial
@@ -37,20 +37,25 @@ Search: TypeAlias = Generator[Trial, TrialResult | None, TrialResult | None]
 Step: TypeAlias = Generator[Trial, TrialResult | None, None]
 
 
-def search(source: SourceMotion, bound: float, effort: Effort, leeway: Callable[[], Floats]) -> Search:
+def search(
+    source: SourceMotion, bound: float, effort: Effort, leeway: Callable[[], Floats], groups: Groups = ()
+) -> Search:
     """Yield trials of one clip, of which it takes the results; return the smallest within all bounds, None without one.
 
     bound: m, only for the size of budgets; acceptance depends on the result's bound usage. leeway: the ratio of each
-    track's moment arm to the compensated one (G,).
+    track's moment arm to the compensated one (G,). groups: of tracks that share a time axis in every trial, if any.
     """
-    return _Search(source, bound, effort, leeway).run()
+    return _Search(source, bound, effort, leeway, groups).run()
 
 
 class _Search:
-    def __init__(self, source: SourceMotion, bound: float, effort: Effort, leeway: Callable[[], Floats]) -> None:
+    def __init__(
+        self, source: SourceMotion, bound: float, effort: Effort, leeway: Callable[[], Floats], groups: Groups
+    ) -> None:
         self._source = source
         self._bound = bound
-        self._effort = effort
+        self._groups = groups
+        self._effort = replace(effort, axes=(), groups=()) if groups else effort
         self._find_leeway = leeway
         self._best: TrialResult | None = None
 
@@ -66,8 +71,10 @@ class _Search:
     def _find_first(self) -> Step:
         tracks = len(self._source.moving)
         start = Plan(np.full(tracks, INITIAL_BUDGET_FRACTION * self._bound), 0.0, "merged", np.ones(tracks))
+        if self._groups:
+            start = replace(start, axes="groups", groups=self._groups)
         yield from self._adapt(start, self._effort.rounds)
-        if self._best is None and not self._source.own.all():
+        if self._best is None and not self._groups and not self._source.own.all():
             start = replace(start, axes="own")
             yield from self._adapt(start, self._effort.rounds)
         if self._best is None:
@@ -149,7 +156,7 @@ class _Search:
 
     def _keep_smaller(self, outcome: TrialResult) -> None:
         if outcome.worst <= 1 and (self._best is None or outcome.size < self._best.size):
-            self._best = _with_groups(outcome)
+            self._best = outcome if self._groups else _with_groups(outcome)
 
     def _adapt(self, plan: Plan, rounds: int) -> Generator[Trial, TrialResult | None, Plan]:
         """Try a plan, adjust each budget by the usage of the points it moves, and repeat; return the last plan.
@@ -254,7 +261,7 @@ class _Search:
             tracks = len(best.plan.budgets)
             changes = spread * chance.standard_normal(tracks) * (chance.random(tracks) < CHANGED_TRACK_FRACTION)
             plan = replace(best.plan, budgets=best.plan.budgets * np.exp(changes))
-            if plan.groups and chance.random() < REGROUPED_FRACTION:
+            if names and plan.groups and chance.random() < REGROUPED_FRACTION:
                 plan = replace(plan, axes=names[int(chance.integers(len(names)))], groups=())
             yield from self._attempt(plan)
             spread = spread * 1.3 if self._best is not best else max(0.96 * spread, LOG_DEVIATIONS[1])

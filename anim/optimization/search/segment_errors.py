@@ -1,4 +1,4 @@
-"""Table of segment errors, for the fewest keys under any budget."""
+"""Table of segment errors, from which the fewest keys under any budget follow."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Bools, Floats, Ints
-from anim.curves.fitting.key_reduction import KEYS_PER_PART
+from anim.arrays import Floats, Ints
 
 SPAN_RANGE = (32, 64)  # limits of the keys covered by one segment, else those of a second
 MAX_TABLE_VALUES = 40_000_000  # above it, callers use `key_reduction.greedy_keys` per budget
 MAX_STACKED_VALUES = 30_000  # tracks × keys tabulated in the same arrays, each 32 bytes in each of three arrays
-MAX_JOINT_TABLE_VALUES = 1_000_000  # of several tables in one search: 4 MB
 MAX_COPIED_VALUES = 4_000_000  # of a table that is copied for faster maxima over groups: 16 MB
 ERROR_WEIGHT = 1e-3  # of a key: selects the smallest error among equal numbers of keys
 
@@ -48,12 +46,12 @@ class SegmentErrors:
 
     def __len__(self) -> int:
         """Return the number of keys of each track."""
-        return self._errors.shape[1]
+        return int(self._errors.shape[1])
 
     @property
     def span(self) -> int:
         """The most intervals that a segment covers."""
-        return self._errors.shape[2]
+        return int(self._errors.shape[2])
 
     def costs(self, tracks: Ints, budgets: Floats, ends: slice = slice(None)) -> NDArray[np.float32]:
         """Return the costs (K, k, span) of segments that end at each key of the `tracks` (k,) under budgets (k,) in m.
@@ -168,107 +166,6 @@ def _padded(asked: Sequence[Tabulated]) -> tuple[Floats, Floats]:
     return components, times
 
 
-def greedy_keys(asked: Sequence[tuple[SegmentErrors, Ints, Floats]]) -> list[Bools]:
-    """Return the keys (k, K) of the tracks (k,) of each table, so that no segment's error exceeds its budget (k,) in m.
-
-    Tables are searched together, so many at a time as memory allows.
-    """
-    found: list[Bools] = []
-    waiting: list[NDArray[np.float32]] = []
-    for errors, tracks, budgets in asked:
-        is_long = len(errors) > KEYS_PER_PART
-        size = len(errors), len(tracks), errors.span
-        if waiting and (is_long or _stacked_size(waiting, size) > MAX_JOINT_TABLE_VALUES):
-            found += _stacked_keys(waiting)
-            waiting = []
-        if is_long:
-            found.append(_keys_of_parts(errors, tracks, budgets))
-        else:
-            waiting.append(errors.costs(tracks, budgets))
-    return found + (_stacked_keys(waiting) if waiting else [])
-
-
-def shared_keys(asked: Sequence[tuple[SegmentErrors, Sequence[Ints], Floats]]) -> list[Bools]:
-    """Return the keys (A, K) of the groups of tracks of each table, so that no segment exceeds a budget of its tracks.
-
-    Groups and budgets are those of `SegmentErrors.shared_costs`; tables have up to KEYS_PER_PART keys.
-    """
-    found: list[Bools] = []
-    waiting: list[NDArray[np.float32]] = []
-    for errors, groups, budgets in asked:
-        if waiting and _stacked_size(waiting, (len(errors), len(groups), errors.span)) > MAX_JOINT_TABLE_VALUES:
-            found += _stacked_keys(waiting)
-            waiting = []
-        waiting.append(errors.shared_costs(groups, budgets))
-    return found + (_stacked_keys(waiting) if waiting else [])
-
-
-def _stacked_size(waiting: Sequence[NDArray[np.float32]], size: tuple[int, ...]) -> int:
-    """Values of tables of costs (K, k, span) in one array with another one of this size."""
-    counts, widths, spans = zip(size, *(costs.shape for costs in waiting), strict=True)
-    return int(max(counts) * sum(widths) * max(spans))
-
-
-def _stacked_keys(tables: Sequence[NDArray[np.float32]]) -> list[Bools]:
-    """The keys (k, K) of each table of costs (K, k, span): the first, and those on the paths of least cost."""
-    if len(tables) == 1:
-        costs = tables[0]
-        return [_fewest_keys(costs[1:], np.full(costs.shape[1], len(costs) - 1))]
-    counts = [len(costs) for costs in tables]
-    tracks = [costs.shape[1] for costs in tables]
-    stacked = np.full((max(counts), sum(tracks), max(costs.shape[2] for costs in tables)), np.inf, np.float32)
-    ends = np.cumsum(tracks)
-    for costs, end in zip(tables, ends.tolist(), strict=True):
-        stacked[: len(costs), end - costs.shape[1] : end, : costs.shape[2]] = costs
-    keep = _fewest_keys(stacked[1:], np.repeat(counts, tracks) - 1)
-    return [part[:, :count] for part, count in zip(np.split(keep, ends[:-1]), counts, strict=True)]
-
-
-def _keys_of_parts(errors: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:
-    """The keys (k, K) of long tracks, searched in parts of KEYS_PER_PART keys, between which a key stays."""
-    keep = np.ones((len(tracks), len(errors)), np.bool_)
-    parts = max(MAX_JOINT_TABLE_VALUES // (len(tracks) * errors.span * KEYS_PER_PART), 1)
-    for start in range(1, len(errors), parts * KEYS_PER_PART):
-        some = slice(start, start + parts * KEYS_PER_PART)
-        keep[:, some] = _keys_after_first(errors.costs(tracks, budgets, some))
-    return keep
-
-
-def _keys_after_first(costs: NDArray[np.float32]) -> Bools:
-    """Keys (k, n) after a first one, on paths through those between two parts; all parts are searched at once.
-
-    costs: (n, k, span) of the segments that end at each key; inf where none does.
-    """
-    count, tracks, span = costs.shape
-    length = min(count, KEYS_PER_PART)
-    parts = -(-count // length)
-    last = np.append(np.full(parts - 1, length), count - (parts - 1) * length)
-    missing = np.full((parts * length - count, tracks, span), np.inf, np.float32)
-    rows = np.concatenate((costs, missing)) if len(missing) else costs
-    rows = rows.reshape(parts, length, tracks, span).transpose(1, 2, 0, 3).reshape(length, tracks * parts, span)
-    keep = _fewest_keys(rows, np.tile(last, tracks))
-    return keep[:, 1:].reshape(tracks, parts * length)[:, :count]
-
-
-def _fewest_keys(costs: NDArray[np.float32], last: Ints) -> Bools:
-    """Mask (R, n + 1) of the first key and those on the paths of least cost from it to the keys `last` (R,).
-
-    costs: (n, R, span) of the segments that end at each key after the first; inf where none does.
-    """
-    count, rows, span = costs.shape
-    total = np.full((rows, count + 1), np.inf, np.float32)
-    total[:, 0] = 0
-    came = np.zeros((rows, count + 1), np.int64)
-    every = np.arange(rows)
-    for end in range(1, count + 1):
-        width = min(span, end)
-        totals = total[:, end - width : end][:, ::-1] + costs[end - 1, :, :width]
-        best = totals.argmin(axis=1)
-        total[:, end] = totals[every, best]
-        came[:, end] = end - 1 - best
-    return _trace(came, last)
-
-
 def _span(times: Floats) -> int:
     duration = float(times[-1] - times[0])
     per_second = int(np.ceil((len(times) - 1) / duration)) if duration > 0 else 1
@@ -279,7 +176,7 @@ def _squared_distances(values: Floats, length: int) -> Floats:
     """Squared distances (G, K - length) of keys `length` intervals apart. values: (C, G, K)."""
     away = values[..., length:] - values[..., : values.shape[2] - length]
     away *= away
-    total = away[0]
+    total: Floats = away[0]
     for each in away[1:]:
         total += each
     return total
@@ -291,8 +188,8 @@ def _segment_errors(squares: Sequence[Floats], times: Floats, clip: Ints) -> Flo
     squares: n arrays (G, K - 1) … (G, K - n), the squared distances of keys 1 … n intervals apart. times: (B, K) s.
     clip: (G,) index of each track's times.
 
-    Three distances give that of a key from the line at its time, by Stewart's theorem: (1 - u) a² + u b² - u (1 - u) c²,
-    a and b from the ends of the segment, c between these, whatever the number of components.
+    Three distances give that of a key from the line at its time, whatever the number of components, by Stewart's
+    theorem: (1 - u) a² + u b² - u (1 - u) c², where a and b are from the ends of the segment and c is between these.
     """
     whole, length = squares[-1], len(squares)
     starts = whole.shape[1]
@@ -309,17 +206,3 @@ def _segment_errors(squares: Sequence[Floats], times: Floats, clip: Ints) -> Flo
         error -= np.multiply(u_of_start, whole, out=part)
         np.maximum(largest, error, out=largest)
     return np.asarray(np.sqrt(largest))
-
-
-def _trace(came: Ints, last: Ints) -> Bools:
-    """Mask (R, K) of the keys on the optimal paths, traced back in `came` (R, K) from the keys `last` (R,)."""
-    keep = np.zeros(came.shape, np.bool_)
-    keep[:, 0] = True
-    for row, at, kept in zip(came, last.tolist(), keep, strict=True):
-        before = row.tolist()
-        path = []
-        while at:
-            path.append(at)
-            at = before[at]
-        kept[path] = True
-    return keep

@@ -32,12 +32,14 @@ from anim.sampling.players import sampler
 class FreeTracks(NamedTuple):
     """A clip to analyze: only the tracks with indices in `free` may change.
 
-    chord_tolerance: m; slerp and nlerp, or both ends of a track, count as equal if closer.
+    chord_tolerance: m; slerp and nlerp, or both ends of a track, count as equal if closer. grid: (K,) s, possible key
+    times of a part of the clip; None for those of all of it.
     """
 
     clip: Clip
     free: Sequence[int]
     chord_tolerance: float
+    grid: Floats | None = None
 
 
 class _Transforms(NamedTuple):
@@ -68,7 +70,7 @@ def analyze_sources(
     answering: the points bound to a node or its descendants.
     """
     clips = [each.clip for each in asked]
-    grids = [key_grid(tracks) for tracks in map(_tracks_of, asked)]
+    grids = [key_grid(_tracks_of(each)) if each.grid is None else each.grid for each in asked]
     is_keys = reference is Reference.KEYS
     ats = [grid if is_keys else measurement_times(grid, clip.tracks) for grid, clip in zip(grids, clips, strict=True)]
     times = _padded(ats)
@@ -91,6 +93,7 @@ def analyze_sources(
             local.of_clip(n),
             world[:, n, : len(ats[n])],
             rotations.get(n),
+            is_part=each.grid is not None,
         )
         for n, each in enumerate(asked)
     ]
@@ -238,6 +241,7 @@ def _source_tracks(
         from_rest, from_middle = (np.sqrt(farthest(values, each)) * meters for each in (rest, middle))
         is_carrying = meters > 0
         signs = closure_signs(values, np.where(is_carrying, tolerances[clip] / np.where(is_carrying, meters, 1.0), 0.0))
+        signs[[asked[n].grid is not None for n in clip.tolist()]] = 0.0  # ends of parts keep their values
         numbers = zip(meters.tolist(), from_rest.tolist(), from_middle.tolist(), signs.tolist(), strict=True)
         for k, ((n, i, node), given) in enumerate(zip(some, numbers, strict=True)):
             shown = every[:, node, n, : local.lengths[n]].T

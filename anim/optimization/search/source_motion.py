@@ -52,7 +52,7 @@ class SourceMotion:
     moving: (G) tracks of the search. own: (G, K) mask of source keys, all for splines. answering: the points that the
     node of each track moves. local: translation (N, W, 3), rotation (N, W, 4), scale (N, W, 3) of all nodes. world:
     (N, W, 3, 4), of nodes with points and those above. chords: rotation (N, W, 4) with nlerp; None where it hardly
-    differs.
+    differs. is_part: whether it is a part of a clip, whose first and last keys have the source's values.
     """
 
     grid: Floats
@@ -64,6 +64,7 @@ class SourceMotion:
     local: tuple[Floats, Floats, Floats]
     world: Floats
     chords: Floats | None
+    is_part: bool = False
 
 
 def key_grid(tracks: Sequence[Track]) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import KEYS_PER_PART, greedy_keys, joint_greedy_keys
-from anim.optimization.search import segment_errors
+from anim.optimization.search import fewest_keys, segment_errors
 from anim.optimization.search.axis_groups import Reaches, group_tracks
 from anim.optimization.search.axis_merging import SharedAxis, merge_axes
 from anim.optimization.search.plan import Groups
@@ -75,20 +75,24 @@ class TimeAxisSearch:
         return bool(self._is_tabled[tracks].any())
 
     def from_table(self, tracks: Ints, budgets: Floats) -> tuple[Ints, tuple[SegmentErrors, Ints, Floats]]:
-        """Return those of some tracks that are in the table, with what `segment_errors.greedy_keys` takes for them."""
+        """Return those of some tracks that are in the table, with what `fewest_keys.greedy_keys` takes for them."""
         there = tracks[self._is_tabled[tracks]]
         return there, (self._table, np.searchsorted(self._tabled, there), budgets[there])
 
+    def has_table(self, tracks: Ints) -> bool:
+        """Return whether there is a table for all of some tracks, which is searched at once."""
+        return len(self.grid) <= KEYS_PER_PART and bool(self._is_tabled[tracks].all())
+
     def can_group(self, tracks: Ints) -> bool:
-        """Return whether there is a table for all of some tracks, and they are not too many for groups."""
-        return self._is_groupable and len(self.grid) <= KEYS_PER_PART and bool(self._is_tabled[tracks].all())
+        """Return whether groups of some tracks can be found: there is a table for all, and they are not too many."""
+        return self._is_groupable and self.has_table(tracks)
 
     def reaches(self, keyed: Ints, budgets: Floats) -> Reaches:
         """Return what `group_tracks` takes for tracks, all of them in the table."""
         return self._table.reach(np.searchsorted(self._tabled, keyed), budgets[keyed]), self.key_bytes[keyed]
 
     def table_of_groups(self, groups: Sequence[Ints], budgets: Floats) -> tuple[SegmentErrors, list[Ints], Floats]:
-        """Return what `segment_errors.shared_keys` takes for groups of tracks."""
+        """Return what `fewest_keys.shared_keys` takes for groups of tracks."""
         rows = [np.searchsorted(self._tabled, each) for each in groups]
         return self._table, rows, budgets[np.concatenate(groups)]
 
@@ -124,7 +128,7 @@ def find_keys(asked: Sequence[Asked]) -> None:
         layouts.search_others(some, budgets)
         if layouts.is_tabled(some):
             searches.append((layouts, budgets, *layouts.from_table(some, budgets)))
-    found = segment_errors.greedy_keys([table for *_, table in searches])
+    found = fewest_keys.greedy_keys([table for *_, table in searches])
     for (layouts, budgets, there, _), keys in zip(searches, found, strict=True):
         layouts.add(there, budgets, keys)
 
@@ -156,19 +160,22 @@ def _merge(asked: Sequence[tuple[TimeAxisSearch, Ints, Bools]]) -> list[list[Sha
 
 
 def _group_axes(asked: Sequence[Asked], key_bytes_factor: float = 1.0) -> list[list[SharedAxis]]:
-    """Axes with the fewest keys for all tracks of a group; merged ones for clips that can't have groups.
+    """Axes with the fewest keys for all tracks of a group; merged ones for clips whose groups can't be found.
 
     key_bytes_factor: on the bytes of keys in the choice of groups.
     """
     found: list[list[SharedAxis]] = [[] for _ in asked]
-    others = [n for n, each in enumerate(asked) if not each.layouts.can_group(each.keyed)]
+    untabled = [n for n, each in enumerate(asked) if each.groups and not each.layouts.has_table(each.keyed)]
+    for n in untabled:
+        found[n] = _untabled_axes(asked[n])
+    others = [n for n, each in enumerate(asked) if not each.groups and not each.layouts.can_group(each.keyed)]
     for n, axes in zip(others, _merge_by_bytes([asked[n] for n in others]) if others else [], strict=True):
         found[n] = axes
-    tabled = [n for n, each in enumerate(asked) if n not in others]
+    tabled = [n for n, each in enumerate(asked) if n not in others and n not in untabled]
     _tabulate([asked[n].layouts for n in tabled])
     groups = _groups([asked[n] for n in tabled], key_bytes_factor)
     tables = [asked[n].layouts.table_of_groups(some, asked[n].budgets) for n, some in zip(tabled, groups, strict=True)]
-    for n, some, keys in zip(tabled, groups, segment_errors.shared_keys(tables), strict=True):
+    for n, some, keys in zip(tabled, groups, fewest_keys.shared_keys(tables), strict=True):
         found[n] = [SharedAxis(mask, tuple(each.tolist())) for mask, each in zip(keys, some, strict=True)]
     return found
 
@@ -189,6 +196,15 @@ def _find_groups(asked: Sequence[Asked], key_bytes_factor: float) -> list[list[I
         time_bytes=coding.time_bytes,
     )
     return [[np.sort(each.keyed[group]) for group in some] for each, some in zip(asked, groups, strict=True)]
+
+
+def _untabled_axes(asked: Asked) -> list[SharedAxis]:
+    """The axes of groups of which some tracks are in no table."""
+    layouts, groups = asked.layouts, _groups_asked_for(asked)
+    return [
+        SharedAxis(joint_greedy_keys(layouts.scaled(each, asked.budgets), layouts.grid), tuple(each.tolist()))
+        for each in groups
+    ]
 
 
 def _groups_asked_for(asked: Asked) -> list[Ints]:

@@ -88,7 +88,7 @@ class ClipTrials:
     def decide(self, trial: Trial, actions: Ints, axes: list[SharedAxis]) -> Decisions | TrialResult | None:
         """Return the decisions of a trial; the result, or None, if it is known without playing the clip."""
         plan = trial.plan
-        tolerances = QUANTIZATION_BUDGET_FRACTION * plan.budgets * plan.coarser / np.maximum(self.meters, 1e-30)
+        tolerances = storage_tolerances(plan, self.meters)
         listed = tolerances.tolist()
         if self.sizes.min_size(actions, axes, listed) >= trial.limit:
             return None
@@ -125,6 +125,11 @@ class ClipTrials:
             tuple((axis.keys.tobytes(), axis.members) for axis in axes),
             tuple(self.sizes.storage_level(i, tolerances[i]) for axis in axes for i in axis.members),
         )
+
+
+def storage_tolerances(plan: Plan, meters: Floats) -> Floats:
+    """Return the tolerance (G,) of each track's storage, in units of its values. meters: (G,) per unit."""
+    return np.asarray(QUANTIZATION_BUDGET_FRACTION * plan.budgets * plan.coarser / np.maximum(meters, 1e-30))
 
 
 def _constant_errors(source: SourceMotion, shared: Sequence[Sequence[Floats]]) -> list[list[tuple[Floats, float]]]:

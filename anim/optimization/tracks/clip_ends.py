@@ -48,11 +48,11 @@ def opened_tracks(before: Clip, after: Clip) -> list[tuple[int | None, str]]:
 
     Tracks that `after` lacks are at rest, and so closed.
     """
-    closed = {track.target for track in before.tracks if _is_closed(track)}
-    return [track.target for track in after.tracks if track.target in closed and not _is_closed(track)]
+    closed = {track.target for track in before.tracks if is_closed(track)}
+    return [track.target for track in after.tracks if track.target in closed and not is_closed(track)]
 
 
-def _is_closed(track: Track) -> bool:
+def is_closed(track: Track) -> bool:
     """Return whether the first and the last value are equal to the bit; q and −q are equal."""
     first, last = track.values[[0, -1]].tolist()  # faster than numpy for so few values
     return bool(first == last or (track.kind is ValueKind.ROTATION and first == [-each for each in last]))

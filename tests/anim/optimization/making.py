@@ -13,8 +13,8 @@ from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
 from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.context import Context, build_context
-from anim.optimization.search.lockstep import SearchResult, search_clips
-from anim.optimization.search.plan import Solution
+from anim.optimization.search.long_clips import search_all
+from anim.optimization.search.plan import FoundKeys, Solution
 from anim.optimization.search.source_analysis import FreeTracks, analyze_sources
 from anim.optimization.search.source_motion import SourceMotion
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
@@ -86,14 +86,14 @@ def task_of(what: Clip, bound: float, *, unused: bool = False) -> Task:
 def solved(context: Context, task: Task) -> Solution | None:
     """The solution of a clip by itself: each of its searches is run alone."""
     steps = solve(context, task)
-    answer: SearchResult | None = None
+    answer: FoundKeys | None = None
     while True:
         try:
             request = steps.send(answer)
         except StopIteration as end:
             solution: Solution | None = end.value
             return solution
-        (answer,) = search_clips(context, [request], context.effort)
+        (answer,) = search_all(context, [request], context.effort)
 
 
 def every_point(of: Scene) -> PointMatrix:

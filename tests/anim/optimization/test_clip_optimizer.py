@@ -14,7 +14,9 @@ from anim.optimization.clip import Solving, Task, solve
 from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
 from anim.optimization.options import Bounds, Effort, Packing, Request
 from anim.optimization.search.context import Context
-from anim.optimization.search.lockstep import SearchRequest, SearchResult, search_clips
+from anim.optimization.search.lockstep import SearchRequest
+from anim.optimization.search.long_clips import search_all
+from anim.optimization.search.plan import FoundKeys
 from tests.anim.optimization.making import nodding, scene, stepping, task_of, waving
 from tests.clips import about, clip, track
 
@@ -140,11 +142,11 @@ def test_some_clips_are_tightened_side_by_side(monkeypatch: pytest.MonkeyPatch) 
     """Those whose first results fail are searched again together, and the others are finished."""
     searched: list[list[str]] = []
 
-    def watched(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[SearchResult | None]:
+    def watched(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[FoundKeys | None]:
         searched.append([each.clip.name for each in requests])
-        return search_clips(context, requests, effort)
+        return search_all(context, requests, effort)
 
-    monkeypatch.setattr(site_, "search_clips", watched)
+    monkeypatch.setattr(site_, "search_all", watched)
     optimizer = ClipOptimizer(Request(Bounds(BOUND, 0.02), effort="fast"), OF, OF, CLIPS)
     tasks = [(n, task_of(CLIPS[n], factor * BOUND)) for n, factor in enumerate((3, 0.8, 3))]
     found = optimize_clips(optimizer, tasks)

@@ -8,7 +8,7 @@ import pytest
 from anim.arrays import Bools, Floats, Ints
 from anim.model import Clip
 from anim.optimization.options import EFFORTS
-from anim.optimization.search import segment_errors, time_axes
+from anim.optimization.search import fewest_keys, segment_errors, time_axes
 from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.time_axes import LAYOUTS, Asked, TimeAxisSearch, find_axes, find_keys
 from tests.anim.optimization.making import (
@@ -41,7 +41,7 @@ def _keys(layouts: TimeAxisSearch, keyed: Ints, budgets: Floats) -> Bools:
     return layouts.known_keys(keyed, budgets)
 
 
-SEARCHES = ((segment_errors, "_stacked_keys"), (time_axes, "greedy_keys"))
+SEARCHES = ((fewest_keys, "_stacked_keys"), (time_axes, "greedy_keys"))
 KEYED = np.array([0, 1, 2])
 BUDGETS = np.array([0.02, 0.01, 0.03, 1.0, 1.0])
 

@@ -176,3 +176,13 @@ def test_no_axis_and_no_track() -> None:
     empty = np.zeros((0, 1), np.int64)
     fit = KeyFit(KeyIntervals(none, empty, np.zeros((0, 41), np.int64), np.zeros((0, 41))), np.zeros((0, 41)))
     assert fit.vectors(np.zeros((3, 0, 41)), none).shape == (3, 0, 1)
+
+
+def test_tracks_on_short_axes_beside_a_long_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of another track: the arrays are as long as that axis."""
+    monkeypatch.setattr(key_fit, "MAX_UNBANDED_KEYS", 4)
+    places = [[0, 20, 40], list(range(0, 41, 4))]
+    values, weights = _walks()[:, :1], np.tile(WEIGHTS, (2, 1))
+    together = KeyFit(_intervals(places), weights).vectors(values, np.zeros(1, np.int64))
+    alone = KeyFit(_intervals(places[:1]), weights[:1]).vectors(values, np.zeros(1, np.int64))
+    assert together[:, :, :3] == pytest.approx(alone, abs=1e-12)

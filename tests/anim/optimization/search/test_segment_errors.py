@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from anim.arrays import Bools, Floats, Ints
 from anim.curves.fitting.key_reduction import greedy_keys
-from anim.optimization.search import segment_errors
+from anim.optimization.search import fewest_keys, segment_errors
 from anim.optimization.search.segment_errors import SPAN_RANGE, SegmentErrors, fits
 from tests.anim.optimization.search.stacks import table_of
 
@@ -29,7 +29,7 @@ def _random(seed: int, count: int, tracks: int = 4) -> tuple[Floats, Floats]:
 
 def _keys(table: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:
     """The keys (k, K) of some tracks of one table."""
-    (keep,) = segment_errors.greedy_keys([(table, tracks, budgets)])
+    (keep,) = fewest_keys.greedy_keys([(table, tracks, budgets)])
     return keep
 
 
@@ -94,12 +94,12 @@ def test_long_lines_have_a_key_now_and_then() -> None:
 
 
 def test_parts_of_long_tracks_are_searched_by_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(segment_errors, "KEYS_PER_PART", 200)
+    monkeypatch.setattr(fewest_keys, "KEYS_PER_PART", 200)
     count = 500
     values, times = _random(4, count, tracks=2)
     budgets = np.array([1.0, 3])
     keep = _keys(table_of(values, times, 4.0), np.arange(2), budgets)
-    monkeypatch.setattr(segment_errors, "MAX_JOINT_TABLE_VALUES", 1)
+    monkeypatch.setattr(fewest_keys, "MAX_JOINT_TABLE_VALUES", 1)
     assert (_keys(table_of(values, times, 4.0), np.arange(2), budgets) == keep).all()
     for start in range(0, count - 1, 200):
         part = slice(start, start + 201)
@@ -152,7 +152,7 @@ def test_keys_of_a_group_keep_the_budget_of_each_of_its_tracks(seed: int, count:
     budgets = budget * np.array([0.5, 2, 1.0, 0.7])
     table, groups = table_of(values, times, np.inf), [np.array([1, 3]), np.array([2]), np.array([0])]
     order = np.concatenate(groups)
-    (keep,) = segment_errors.shared_keys([(table, groups, budgets[order])])
+    (keep,) = fewest_keys.shared_keys([(table, groups, budgets[order])])
     for mask, group in zip(keep, groups, strict=True):
         for track in group.tolist():
             assert _missed(values[track], times, mask) <= budgets[track] * (1 + 1e-5)

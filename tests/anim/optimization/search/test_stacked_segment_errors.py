@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from anim.arrays import Bools, Floats, Ints
-from anim.optimization.search import segment_errors
-from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, greedy_keys, tabulate
+from anim.optimization.search import fewest_keys, segment_errors
+from anim.optimization.search.segment_errors import SegmentErrors, Tabulated, tabulate
 from tests.anim.optimization.search.stacks import table_of
 from tests.calls import count_calls
 
@@ -82,21 +82,19 @@ def _plain(table: SegmentErrors, tracks: Ints, budgets: Floats) -> Bools:
 
 
 def test_keys_are_those_of_a_plain_loop() -> None:
-    for asked, keys in zip(_asked(), greedy_keys(_asked()), strict=True):
+    for asked, keys in zip(_asked(), fewest_keys.greedy_keys(_asked()), strict=True):
         np.testing.assert_array_equal(keys, _plain(*asked))
 
 
-@pytest.mark.parametrize(
-    ("values", "calls"), [(1, len(SHAPES)), (20000, 3), (segment_errors.MAX_JOINT_TABLE_VALUES, 1)]
-)
+@pytest.mark.parametrize(("values", "calls"), [(1, len(SHAPES)), (20000, 3), (fewest_keys.MAX_JOINT_TABLE_VALUES, 1)])
 def test_tables_together_have_the_keys_of_each_alone(values: int, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also in parts, where all together would take too much memory."""
     asked = _asked()
-    alone = [greedy_keys([each])[0] for each in asked]
+    alone = [fewest_keys.greedy_keys([each])[0] for each in asked]
     assert len({keys.sum() for keys in alone}) > 3
-    monkeypatch.setattr(segment_errors, "MAX_JOINT_TABLE_VALUES", values)
-    counted = count_calls(monkeypatch, segment_errors, "_stacked_keys")
-    together = greedy_keys(asked)
+    monkeypatch.setattr(fewest_keys, "MAX_JOINT_TABLE_VALUES", values)
+    counted = count_calls(monkeypatch, fewest_keys, "_stacked_keys")
+    together = fewest_keys.greedy_keys(asked)
     assert len(counted) == calls
     for some, keys in zip(together, alone, strict=True):
         np.testing.assert_array_equal(some, keys)
@@ -104,13 +102,13 @@ def test_tables_together_have_the_keys_of_each_alone(values: int, calls: int, mo
 
 @pytest.mark.parametrize("length", [10, 50, 100])
 def test_long_tracks_are_in_the_same_parts_alone_and_together(length: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(segment_errors, "KEYS_PER_PART", length)
+    monkeypatch.setattr(fewest_keys, "KEYS_PER_PART", length)
     asked = _asked()
-    alone = [greedy_keys([each])[0] for each in asked]
+    alone = [fewest_keys.greedy_keys([each])[0] for each in asked]
     assert all(keys[:, ::length].all() for keys in alone if keys.shape[1] > length)
-    for some, keys in zip(greedy_keys(asked), alone, strict=True):
+    for some, keys in zip(fewest_keys.greedy_keys(asked), alone, strict=True):
         np.testing.assert_array_equal(some, keys)
 
 
 def test_nothing_is_asked() -> None:
-    assert greedy_keys([]) == []
+    assert fewest_keys.greedy_keys([]) == []

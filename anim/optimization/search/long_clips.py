@@ -1,0 +1,185 @@
+"""Search of clips of any length: long ones part after part, so that memory does not follow their length.
+
+Where two parts meet, all tracks with keys have one with the source's value, so that each part plays as it was measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from anim.arrays import Floats, Ints
+from anim.model import Clip, TimeAxis, Track
+from anim.optimization.options import Effort
+from anim.optimization.search.context import Context
+from anim.optimization.search.lockstep import ClipPart, SearchRequest, SearchResult, search_clips
+from anim.optimization.search.plan import FoundKeys, TrackAction
+from anim.optimization.search.source_motion import SourceTrack, key_grid
+from anim.optimization.search.trial import storage_tolerances
+from anim.optimization.tracks import quantization
+from anim.optimization.tracks.clip_ends import is_closed
+from anim.optimization.tracks.quantization import EncodedKeys, Encoding
+
+MAX_WHOLE_MATRICES = 80_000  # possible key times × nodes of a clip that is searched at once, in about 120 MB
+PART_MATRICES = 40_000
+MIN_PART_KEYS = 256
+
+
+class _PartKeys(NamedTuple):
+    """Keys of one track in a part.
+
+    action: in the part. constant: (C,) its value there, unless it has keys. at: (K,) indices of its keys on the grid of
+    the clip. values: (K, C). tolerance: of their storage, in units of values.
+    """
+
+    action: int
+    constant: Floats
+    at: Ints
+    values: Floats
+    tolerance: float
+
+
+def search_all(context: Context, requests: Sequence[SearchRequest], effort: Effort) -> list[FoundKeys | None]:
+    """Return the keys found for each clip; None without a result within all bounds."""
+    grids = [key_grid([each.clip.tracks[i] for i in each.free]) for each in requests]
+    most = MAX_WHOLE_MATRICES // max(len(context.skeleton), 1)
+    short = [n for n, grid in enumerate(grids) if len(grid) <= max(most, 2 * MIN_PART_KEYS)]
+    results = search_clips(context, [requests[n] for n in short], effort) if short else []
+    found = {n: None if each is None else each.found for n, each in zip(short, results, strict=True)}
+    return [
+        found[n] if n in found else _search_in_parts(context, each, grids[n], effort) for n, each in enumerate(requests)
+    ]
+
+
+def _search_in_parts(context: Context, request: SearchRequest, grid: Floats, effort: Effort) -> FoundKeys | None:
+    """Search the part with the most motion first: the others have its groups of tracks, and its constants if they can.
+
+    grid: (K,) s, possible key times of the clip.
+    """
+    length = max(PART_MATRICES // max(len(context.skeleton), 1), MIN_PART_KEYS)
+    cuts = np.linspace(0, len(grid) - 1, -(-len(grid) // length) + 1).round().astype(np.int64)
+    tracks = [request.clip.tracks[i] for i in request.free]
+    found: dict[int, list[_PartKeys]] = {}
+    part = ClipPart(grid, ())
+    for n in _by_motion(tracks, grid[cuts]):
+        first, last = int(cuts[n]), int(cuts[n + 1])
+        part = part._replace(grid=grid[first : last + 1])
+        clip = _cut(request.clip, float(grid[first]), float(grid[last]))
+        (result,) = search_clips(context, [request._replace(clip=clip, part=part)], effort)
+        if result is None:
+            return None
+        if not found:
+            part = part._replace(groups=result.result.groups)
+            request = request._replace(shared=_with_constants(request.shared, result))
+        found[n] = list(_keys_of_part(result, first, last))
+    return _join([found[n] for n in range(len(cuts) - 1)], tracks, request.free, grid, context.coding)
+
+
+def _by_motion(tracks: Sequence[Track], times: Floats) -> list[int]:
+    """The parts between `times` (B + 1,): the one with the most motion, then the others in order."""
+    total = np.zeros(len(times) - 1)
+    for track in tracks:
+        steps = np.linalg.norm(np.diff(track.values, axis=0), axis=1)
+        way = np.interp(times, track.times, np.append(0.0, np.cumsum(steps)))
+        total += np.diff(way)
+    most = int(total.argmax())
+    return [most, *(n for n in range(len(total)) if n != most)]
+
+
+def _cut(clip: Clip, start: float, end: float) -> Clip:
+    """The clip with those keys only that count between two times."""
+    axes: dict[TimeAxis, tuple[slice, TimeAxis]] = {}
+    for axis in clip.time_axes:
+        last = min(int(np.searchsorted(axis.times, end)), len(axis) - 1)
+        first = min(max(int(np.searchsorted(axis.times, start, side="right")) - 1, 0), last)
+        axes[axis] = slice(first, last + 1), TimeAxis(axis.times[first : last + 1])
+    return Clip(clip.name, tuple(_select(track, *axes[track.time_axis]) for track in clip.tracks))
+
+
+def _select(track: Track, keys: slice, axis: TimeAxis) -> Track:
+    arriving, leaving = (None if each is None else each[keys] for each in (track.in_tangents, track.out_tangents))
+    return Track.unchecked(
+        track.node,
+        track.path,
+        track.interpolation,
+        axis,
+        track.values[keys],
+        arriving,
+        leaving,
+        track.pointer,
+        track.storage,
+    )
+
+
+def _with_constants(shared: Sequence[Sequence[Floats]], result: SearchResult) -> tuple[Sequence[Floats], ...]:
+    """The constants that tracks may take, first those that they have in a part."""
+    actions, keys = result.result.actions.tolist(), result.result.keys
+    return tuple(
+        (keys[k].values[0], *each) if actions[k] == TrackAction.CONSTANT else each for k, each in enumerate(shared)
+    )
+
+
+def _keys_of_part(found: SearchResult, first: int, last: int) -> Iterator[_PartKeys]:
+    """Yield the keys of each track in the part between two indices of the clip's grid."""
+    result, moving = found.result, found.source.moving
+    tolerances = storage_tolerances(result.plan, np.array([each.meters for each in moving]))
+    for k, (track, tolerance) in enumerate(zip(moving, tolerances.tolist(), strict=True)):
+        action = int(result.actions[k])
+        if k in result.on:
+            values = result.keys[k].values
+            yield _PartKeys(action, values[0], first + np.flatnonzero(result.on[k]), values, tolerance)
+        else:
+            constant = result.keys[k].values[0] if action == TrackAction.CONSTANT else track.rest
+            # within one step of the grid from the source's value to the constant, which is as near there
+            at = np.array([first, first + 1, last - 1, last])
+            yield _PartKeys(action, constant, at, _between_ends(track, constant), tolerance)
+
+
+def _between_ends(track: SourceTrack, constant: Floats) -> Floats:
+    """The source's first value, the constant twice, and the source's last value (4, C)."""
+    return np.stack((track.values[0], constant, constant, track.values[-1]))
+
+
+def _join(
+    parts: Sequence[Sequence[_PartKeys]], tracks: Sequence[Track], free: Sequence[int], grid: Floats, coding: Encoding
+) -> FoundKeys:
+    """The keys of tracks from those of each part, in order."""
+    actions = np.full(len(tracks), TrackAction.KEYED, np.int64)
+    keys, on = {}, {}
+    for k, (track, some) in enumerate(zip(tracks, zip(*parts, strict=True), strict=True)):
+        actions[k] = _joint_action(some)
+        if actions[k] == TrackAction.CONSTANT:
+            keys[k] = quantization.constant_cost(some[0].constant)
+        elif actions[k] == TrackAction.KEYED:
+            on[k] = np.zeros(len(grid), np.bool_)
+            on[k][np.concatenate([each.at for each in some])] = True
+            keys[k] = _joint_keys(some, track, coding)
+    return FoundKeys(grid, tuple(free), actions, keys, on)
+
+
+def _joint_action(parts: Sequence[_PartKeys]) -> TrackAction:
+    """The action of a track: dropped, or the same constant, if it is so in all parts; else keyed."""
+    actions = {each.action for each in parts}
+    if actions == {TrackAction.DROPPED}:
+        return TrackAction.DROPPED
+    first = parts[0].constant
+    same = all((each.constant == first).all() or (each.constant == -first).all() for each in parts)
+    return TrackAction.CONSTANT if same and TrackAction.KEYED not in actions else TrackAction.KEYED
+
+
+def _joint_keys(parts: Sequence[_PartKeys], track: Track, coding: Encoding) -> EncodedKeys:
+    """The keys of all parts, those where two meet once, in one format: that of the smallest tolerance."""
+    pieces: list[Floats] = []
+    for each in parts:
+        values = each.values
+        if pieces and track.path == "rotation" and pieces[-1][-1] @ values[0] < 0:
+            values = -values
+        pieces.append(values[1:] if pieces else values)
+    joined = np.concatenate(pieces)
+    if is_closed(track):
+        joined[-1] = -joined[0] if track.path == "rotation" and joined[-1] @ joined[0] < 0 else joined[0]
+    keyed = [each.tolerance for each in parts if each.action == TrackAction.KEYED]
+    tolerance = min(keyed or [each.tolerance for each in parts])
+    return quantization.encode(joined, quantization.choose_format(joined, track.path, tolerance, coding.packing))
