@@ -9,6 +9,7 @@ import re
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -18,9 +19,10 @@ from typer.models import ArgumentInfo, OptionInfo
 
 from anim import units
 from anim.errors import AnimError, RangeError, not_written
+from anim.files.special_files import descriptor_of
 
 OUTPUTS = ("output", "files")  # parameters whose value, or last value, is OUT
-STDOUT_PATHS = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")  # opened again, a file would begin anew
+STDOUT = 1  # its descriptor
 DEPFILE = "gltf_anim.depfile"  # key of the context
 MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
 METAVARS = {str: "TEXT", int: "N", float: "N"}
@@ -66,7 +68,7 @@ class Command(Parsing, TyperCommand):
         from anim.memory import memory_limit
 
         for name in OUTPUTS:
-            if ctx.params.get(name) in STDOUT_PATHS:
+            if isinstance(path := ctx.params.get(name), str) and _is_stdout(path):
                 ctx.params[name] = "-"
         try:
             # Results that are not finite are errors where they are written.
@@ -108,6 +110,11 @@ class Command(Parsing, TyperCommand):
             if shown:
                 with formatter.section(heading):
                     formatter.write_dl(shown)
+
+
+def _is_stdout(path: str) -> bool:
+    """Return whether a path is another name of "-". A link with a file extension is none: it selects a format."""
+    return not os.path.splitext(path)[1] and descriptor_of(Path(path)) == STDOUT
 
 
 def _refuse_named_file(path: str, values: Iterable[Any]) -> None:

@@ -48,7 +48,9 @@ OPENING = {  # modules of the library that may open a path
     "anim/caches/formats/usd_package.py",  # its library takes names only
     "anim/caches/temporary_files.py",  # for libraries that take names only
     "anim/files/atomic.py",
+    "anim/files/folder_lock.py",
     "anim/files/resolver.py",
+    "anim/files/special_files.py",
     "anim/gltf/io/gltf_files.py",
     "anim/gltf/io/images.py",
     "anim/gltf/io/source.py",

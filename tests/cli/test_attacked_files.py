@@ -269,10 +269,17 @@ def test_stdout_by_its_path_takes_what_stdout_takes(way: str, tmp_path: Path) ->
         ("check in.glb --write-baseline OUT", "/dev/stdout"),
         ("convert in.glb OUT -q", "/dev/fd/3"),
         ("bake in.glb OUT --fps 4 --clip bend --format npz -q", "/dev/fd/3"),
+        ("convert in.glb OUT -q", "//dev/stdout"),
+        ("convert in.glb OUT -q", "link"),
+        ("bake in.glb OUT --fps 4 --clip bend --format npz -q", "link.npz"),
+        ("plot --ease quad-in OUT --format svg -q", "devices/stdout"),
     ],
 )
 def test_what_is_open_already_is_written_after_what_is_there(line: str, place: str, tmp_path: Path) -> None:
     (tmp_path / "in.glb").write_bytes(built("arm"))
+    (tmp_path / "devices").symlink_to("/dev")
+    for name in ("link", "link.npz"):
+        (tmp_path / name).symlink_to("devices/stdout")
     alone = "gltf-anim " + line.replace("OUT", "alone.glb" if line.startswith("convert") else "alone")
     expected = shell(f"{alone} >&2 && cat alone*", tmp_path).product()
     command = "gltf-anim " + line.replace("OUT", place)
