@@ -7,7 +7,7 @@ import math
 import os
 import re
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -81,26 +81,14 @@ class Command(Parsing, TyperCommand):
             raise
 
     def _invoke_with_depfile(self, ctx: Any, path: str) -> Any:
-        """Run the command, and write a dependency file after it."""
-        from cli.errors import UsageError
-        from cli.io import depfile, documents
+        """Run the command, and write a dependency file with its output."""
+        from cli.io import depfile_output
 
         values = [ctx.params[name] for name in OUTPUTS if ctx.params.get(name)]
         output = "" if not values else values[0] if isinstance(values[0], str) else values[0][-1]
-        if output in ("", documents.PIPE):
-            raise UsageError("--depfile needs an output file: name OUT")
-        documents.check_file(path)
-        if os.path.realpath(path) == os.path.realpath(output):
-            raise UsageError(f"{path}: --depfile would replace OUT (expected another file)")
-        _refuse_named_file(path, ctx.params.values())
-        with depfile.record_files() as record:
-            code = super().invoke(ctx)
-        if not code and not ctx.params.get("dry_run"):
-            if os.path.realpath(path) in map(os.path.realpath, record.inputs):
-                _refuse_input(path)
-            outputs = list(record.outputs) if "{" in output else [output]
-            documents.write_text(depfile.rule(outputs or [output], list(record.inputs)), path)
-        return code
+        depfile_output.check(path, output, ctx.params.values())
+        run = super().invoke
+        return depfile_output.invoke(lambda: run(ctx), path, output, dry_run=bool(ctx.params.get("dry_run")))
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the tables of arguments and options."""
@@ -115,20 +103,6 @@ class Command(Parsing, TyperCommand):
 def _is_stdout(path: str) -> bool:
     """Return whether a path is another name of "-". A link with a file extension is none: it selects a format."""
     return not os.path.splitext(path)[1] and descriptor_of(Path(path)) == STDOUT
-
-
-def _refuse_named_file(path: str, values: Iterable[Any]) -> None:
-    """Raise UsageError before the command runs if one of its arguments or options names the dependency file."""
-    for value in values:
-        for each in [value] if isinstance(value, str) else value if isinstance(value, list | tuple) else ():
-            if isinstance(each, str) and os.path.realpath(each) == os.path.realpath(path):
-                _refuse_input(path)
-
-
-def _refuse_input(path: str) -> None:
-    from cli.errors import UsageError
-
-    raise UsageError(f"{path}: --depfile would replace an input (expected another file)")
 
 
 def _memory_option() -> TyperOption:

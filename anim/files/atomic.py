@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from anim.arrays import Bytes
 from anim.errors import OutputError, not_written
-from anim.files import resolver, signals, special_files
+from anim.files import before_commit, resolver, signals, special_files
 from anim.files.folder_lock import lock_folder
 from anim.files.stream import write_stream
 
@@ -42,22 +42,39 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     So errors of this file (no permission, a full disk) are raised before the block. Other than regular files are
     written before it.
     """
-    target, temporary = resolver.resolve_links(path), None
-    with temporary_files() as made:
-        with name_errors(path):
-            if is_special := special_files.is_special(path):
-                with special_files.open_special(path) as file:
-                    write_stream(file, (piece.data for piece in pieces), str(path))
-            else:
-                check_writable(path)
-            if not is_special and not has_bytes(target, pieces):
-                temporary = write_temporary(target, pieces, made)
+    with stage(path, pieces) as commit:
         yield
+        commit()
+
+
+@contextmanager
+def stage(path: Path, pieces: Sequence[Bytes]) -> Iterator[Callable[[], None]]:
+    """Write one file as a temporary sibling, until the end of the block; give the function that renames it.
+
+    Special files are written at once.
+    """
+    target, temporary = resolver.resolve_links(path), None
+    is_special = special_files.is_special(path)
+
+    def commit() -> None:
+        before_commit.run_job()
         with name_errors(path):
             if temporary is not None:
                 os.replace(temporary, target)
             elif not is_special:
                 os.utime(target)
+
+    with temporary_files() as made:
+        if is_special:
+            before_commit.run_job()
+        with name_errors(path):
+            if is_special:
+                with special_files.open_special(path) as file:
+                    write_stream(file, (piece.data for piece in pieces), str(path))
+            else:
+                check_writable(path)
+                temporary = None if has_bytes(target, pieces) else write_temporary(target, pieces, made)
+        yield commit
 
 
 @dataclass
@@ -96,6 +113,7 @@ class AtomicOutputs:
         """
         import filecmp
 
+        before_commit.run_job()
         main = self.main if self.main in self.files else min(self.files)
         with lock_folder(self.folder):
             new = {}

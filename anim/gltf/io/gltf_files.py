@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from anim.errors import OutputError
-from anim.files import atomic, resolver, signals, special_files
+from anim.files import atomic, before_commit, resolver, signals, special_files
 from anim.files.folder_lock import lock_folder
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container, unused_buffers
@@ -104,6 +104,7 @@ def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> N
         waiting = {place: atomic.write_temporary(place, pieces, made) for place, pieces in new.items()}
         is_there = atomic.has_bytes(path, text)
         main = None if is_there else atomic.write_temporary(path, text, made)
+        before_commit.run_job()
         with signals.hold_signals(), atomic.temporary_files() as placed:
             for place, temporary in waiting.items():
                 atomic.move_to_free(temporary, place)
