@@ -77,6 +77,7 @@ class Command(Parsing, TyperCommand):
                 return super().invoke(ctx) if path is None else self._invoke_with_depfile(ctx, path)
         except AnimError as error:
             options = {str(each.name): each.opts[0] for each in self.params if each.param_type_name == "option"}
+            options.setdefault("fps", options.get("samples_per_second", "fps"))  # the rate of what is measured
             name_options(error, options)
             raise
 
