@@ -53,6 +53,16 @@ class PointMatrix:
     def _rows(self) -> PointRows:
         return PointRows(self._matrix.astype(np.float32))
 
+    def squares(self, differences: Callable[[Ints], Floats]) -> Floats:
+        """Return the squared lengths (P, F) of displacements, in float32; in float64 if some are beyond it.
+
+        differences: gives those of world matrices (J, F, 3, 4) of nodes (J,).
+        """
+        found = self._rows.squares(stack_blocks(differences, self.nodes, np.float32))
+        if np.isfinite(found).all():
+            return found
+        return PointRows(self._matrix).squares(stack_blocks(differences, self.nodes, np.float64))
+
     @cached_property
     def _matrix(self) -> Any:
         """The same in float64: dense, sparse, or of one joint per row."""
@@ -158,11 +168,11 @@ class PointRows:
         return _moves(self._matrix, columns.astype(np.float32, copy=False))
 
     def squares(self, columns: NDArray[Any]) -> Floats:
-        """Return the squared lengths (P, F) of displacements, in float32, of many points in blocks."""
+        """Return the squared lengths (P, F) of displacements, in the type of the columns, of many points in blocks."""
         parts = self._matrix.split(columns.shape[1]) if isinstance(self._matrix, OneJointRows) else [self._matrix]
         found = []
         for part in parts:
-            moves = _moves(part, columns.astype(np.float32, copy=False))
+            moves = _moves(part, columns)
             moves *= moves
             found.append(moves.sum(axis=1))
         return np.concatenate(found)
@@ -181,7 +191,7 @@ def _dense_blocks(
             yield rows, used, np.ascontiguousarray(matrix[rows][:, used])
 
 
-def _moves(matrix: Any, columns: NDArray[np.float32]) -> Floats:
+def _moves(matrix: Any, columns: NDArray[Any]) -> Floats:
     moved = np.asarray(matrix @ columns)
     return moved.reshape(len(moved), 3, columns.shape[1] // 3)
 
@@ -192,10 +202,12 @@ def stack_points(world: Floats, nodes: Ints) -> Floats:
     return chosen.transpose(0, 3, 2, 1).reshape(4 * len(nodes), 3 * world.shape[1])
 
 
-def stack_blocks(matrices: Callable[[Ints], Floats], nodes: Ints) -> NDArray[np.float32]:
-    """Return the same in float32, from a function that gives the matrices (J, F, 3, 4) of some nodes, in blocks."""
+def stack_blocks(
+    matrices: Callable[[Ints], Floats], nodes: Ints, kind: type[np.floating[Any]]
+) -> NDArray[np.floating[Any]]:
+    """Return the same in a type, from a function that gives the matrices (J, F, 3, 4) of some nodes, in blocks."""
     blocks = [nodes[i : i + NODE_BLOCK] for i in range(0, max(len(nodes), 1), NODE_BLOCK)]
-    stacked = (stack_points(matrices(each), np.arange(len(each))).astype(np.float32) for each in blocks)
+    stacked = (stack_points(matrices(each), np.arange(len(each))).astype(kind) for each in blocks)
     return np.concatenate(list(stacked))
 
 
