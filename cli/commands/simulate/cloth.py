@@ -196,8 +196,7 @@ def command(
     )
     if report is not None and not dry_run:
         write_report(run.report, report)
-    for note in saved.written.notes:
-        reporter.info(f"note: {note}")
+    saved.report(reporter)
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     reporter.info(
