@@ -116,7 +116,7 @@ endsolid
         (b"solid x\nfacet normal 0 0 1\n" + BINARY, "has no vertices"),
         (bytes(range(256)) * 2, "has no vertices"),
         (ASCII_STL.replace(b"vertex 0 1 0\n", b""), "is no .stl that can be read"),
-        (b"endsolid solid" + BINARY, "is no .stl that can be read (endsolid precedes solid!)"),
+        (b"endsolid solid" + BINARY, "is no .stl that can be read: damaged"),
         (bytes(80) + b"\xff\xff\xff\xff" + bytes(50), "has no vertices"),
     ],
 )
