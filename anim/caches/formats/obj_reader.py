@@ -8,6 +8,8 @@ from anim.arrays import AnyArray, Ints
 from anim.caches.formats.mesh_text import MAX_DIGITS, quote
 from anim.errors import FormatError
 
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
 
 def read(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
     """Return positions (V, 3), triangles (T, 3), polygons as fans, and normals (V, 3) or None.
@@ -18,7 +20,7 @@ def read(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
     faces: list[list[int]] = []
     lines: list[int] = []  # of the triangles
     same_normals = True
-    for number, line in enumerate(data.splitlines(), 1):
+    for number, line in enumerate(data.removeprefix(BYTE_ORDER_MARK).splitlines(), 1):
         words = line.split()
         if words and words[0] in rows:
             rows[words[0]].append(_three_numbers(words, number))
