@@ -172,6 +172,9 @@ def test_unity_needs_keys_at_0_in_every_track() -> None:
     assert found(document, "GA105") == []
     (finding,) = found_in_unity(document, "GA105")
     assert finding.problem == "1 track has its first key at 0.5 s: Unity shows another pose until then"
+    assert finding.time_s == 0.5
+    (finding,) = found(with_tracks(late), "GA105")
+    assert (finding.problem, finding.time_s) == ("first key at 0.5 s: players hold the first pose until then", 0.5)
     fixed = fix_all(checked(document), RuleSelection(select=("GA105",), target="unity"), unsafe=False)
     assert [each.error_m for each in fixed.applied] == [0.0]
     assert found_in_unity(fixed.document, "GA105") == []
