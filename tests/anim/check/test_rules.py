@@ -19,21 +19,8 @@ from anim.check.selection import RuleSelection
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from tests.anim.check.cases import (
-    ARM_JOINTS,
-    SMOOTH,
-    SOUND,
-    WRONG,
-    checked,
-    edited,
-    found,
-    joint,
-    put,
-    same_names,
-    selection,
-    steps,
-    with_tracks,
-)
+from tests.anim.check.cases import SMOOTH, SOUND, WRONG, checked, edited, found, joint, selection, steps, with_tracks
+from tests.anim.check.json_faults import ARM_JOINTS, put, same_names
 from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, track
 from tests.files import glb_of, opened_fixture
 
