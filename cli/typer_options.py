@@ -7,8 +7,9 @@ import math
 import os
 import re
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -18,9 +19,10 @@ from typer.models import ArgumentInfo, OptionInfo
 
 from anim import units
 from anim.errors import AnimError, RangeError, not_written
+from anim.files.special_files import descriptor_of
 
 OUTPUTS = ("output", "files")  # parameters whose value, or last value, is OUT
-STDOUT_PATHS = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")  # opened again, a file would begin anew
+STDOUT = 1  # its descriptor
 DEPFILE = "gltf_anim.depfile"  # key of the context
 MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
 METAVARS = {str: "TEXT", int: "N", float: "N"}
@@ -66,7 +68,7 @@ class Command(Parsing, TyperCommand):
         from anim.memory import memory_limit
 
         for name in OUTPUTS:
-            if ctx.params.get(name) in STDOUT_PATHS:
+            if isinstance(path := ctx.params.get(name), str) and _is_stdout(path):
                 ctx.params[name] = "-"
         try:
             # Results that are not finite are errors where they are written.
@@ -75,30 +77,19 @@ class Command(Parsing, TyperCommand):
                 return super().invoke(ctx) if path is None else self._invoke_with_depfile(ctx, path)
         except AnimError as error:
             options = {str(each.name): each.opts[0] for each in self.params if each.param_type_name == "option"}
+            options.setdefault("fps", options.get("samples_per_second", "fps"))  # the rate of what is measured
             name_options(error, options)
             raise
 
     def _invoke_with_depfile(self, ctx: Any, path: str) -> Any:
-        """Run the command, and write a dependency file after it."""
-        from cli.errors import UsageError
-        from cli.io import depfile, documents
+        """Run the command, and write a dependency file with its output."""
+        from cli.io import depfile_output
 
         values = [ctx.params[name] for name in OUTPUTS if ctx.params.get(name)]
         output = "" if not values else values[0] if isinstance(values[0], str) else values[0][-1]
-        if output in ("", documents.PIPE):
-            raise UsageError("--depfile needs an output file: name OUT")
-        documents.check_file(path)
-        if os.path.realpath(path) == os.path.realpath(output):
-            raise UsageError(f"{path}: --depfile would replace OUT (expected another file)")
-        _refuse_named_file(path, ctx.params.values())
-        with depfile.record_files() as record:
-            code = super().invoke(ctx)
-        if not code and not ctx.params.get("dry_run"):
-            if os.path.realpath(path) in map(os.path.realpath, record.inputs):
-                _refuse_input(path)
-            outputs = list(record.outputs) if "{" in output else [output]
-            documents.write_text(depfile.rule(outputs or [output], list(record.inputs)), path)
-        return code
+        depfile_output.check(path, output, ctx.params.values())
+        run = super().invoke
+        return depfile_output.invoke(lambda: run(ctx), path, output, dry_run=bool(ctx.params.get("dry_run")))
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the tables of arguments and options."""
@@ -110,18 +101,9 @@ class Command(Parsing, TyperCommand):
                     formatter.write_dl(shown)
 
 
-def _refuse_named_file(path: str, values: Iterable[Any]) -> None:
-    """Raise UsageError before the command runs if one of its arguments or options names the dependency file."""
-    for value in values:
-        for each in [value] if isinstance(value, str) else value if isinstance(value, list | tuple) else ():
-            if isinstance(each, str) and os.path.realpath(each) == os.path.realpath(path):
-                _refuse_input(path)
-
-
-def _refuse_input(path: str) -> None:
-    from cli.errors import UsageError
-
-    raise UsageError(f"{path}: --depfile would replace an input (expected another file)")
+def _is_stdout(path: str) -> bool:
+    """Return whether a path is another name of "-". A link with a file extension is none: it selects a format."""
+    return not os.path.splitext(path)[1] and descriptor_of(Path(path)) == STDOUT
 
 
 def _memory_option() -> TyperOption:

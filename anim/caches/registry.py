@@ -40,7 +40,8 @@ class CacheFormat:
     without a name.
 
     takes: names of the fields of ReadOptions ("input_fps") and WriteOptions that it supports. holds: "normals",
-    "tangents", if it stores them beside positions. files: the files of one cache.
+    "tangents", if it stores them beside positions. files: the files of one cache. check_frames: raises UnsupportedError
+    for more frames of so many vertices than it can write, before any is computed; None if they are streamed.
     """
 
     about: str
@@ -50,6 +51,7 @@ class CacheFormat:
     takes: frozenset[str] = frozenset()
     holds: frozenset[str] = frozenset()
     files: Files = Files.ONE
+    check_frames: Callable[[int, int, WriteOptions], None] | None = None
 
 
 NORMALS = frozenset(("normals",))
@@ -104,6 +106,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         starts_with(b"glTF"),
         GLTF_OPTIONS,
         BOTH,
+        check_frames=gltf.check_frames,
     ),
     ".gltf": CacheFormat(
         "glTF as text, with a .bin",
@@ -113,6 +116,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         GLTF_OPTIONS,
         BOTH,
         Files.SEVERAL,
+        gltf.check_frames,
     ),
     ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", b"\x76\x2f\x31\x01", "preset", "depth"),
     ".png": _texture(".png", "vertex animation texture, 16 bit", b"\x89PNG\r\n\x1a\n", "preset"),
@@ -135,6 +139,12 @@ def reader_for(ending: str) -> Read:
     if read is None:
         raise UnsupportedError(f"{ending[1:]} is only written, not read", help="USD, PC2 and MDD are read")
     return partial(_read, read)
+
+
+def check_frames(ending: str, frames: int, vertices: int, writing: WriteOptions) -> None:
+    """Raise UnsupportedError for more frames of so many vertices than a format can write."""
+    if (check := _of(ending).check_frames) is not None:
+        check(frames, vertices, writing)
 
 
 def writer_for(ending: str) -> Write:

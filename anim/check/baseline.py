@@ -31,7 +31,7 @@ def dump(found: Iterable[FileFinding], rename: Callable[[str], str] = str, kept:
 def load(text: str) -> Counter[str]:
     """Return the counts by fingerprint. Raises FormatError if the text is no baseline."""
     try:
-        content = json.loads(text)
+        content = json.loads(text.removeprefix("\ufeff"))
     except (ValueError, RecursionError):
         content = None
     findings = content.get("findings") if isinstance(content, dict) else None

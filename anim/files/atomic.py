@@ -8,10 +8,8 @@ set.
 from __future__ import annotations
 
 import os
-import re
 import tempfile
-import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,13 +17,12 @@ from typing import BinaryIO
 
 from anim.arrays import Bytes
 from anim.errors import OutputError, not_written
-from anim.files import resolver, signals
+from anim.files import before_commit, resolver, signals, special_files
+from anim.files.folder_lock import lock_folder
 from anim.files.stream import write_stream
 
 MAX_PREFIX_LENGTH = 40  # characters of the target name in a temporary name, so that long names remain valid
 BLOCK_BYTES = 1 << 24  # copied or compared at a time
-MAX_LOCK_WAIT_S = 5.0  # a lock held by a script (`flock FOLDER gltf-anim …`) would block forever
-LOCK_POLL_S = 0.005
 
 
 def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
@@ -45,41 +42,39 @@ def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
     So errors of this file (no permission, a full disk) are raised before the block. Other than regular files are
     written before it.
     """
-    target, temporary = resolver.resolve_links(path), None
-    with temporary_files() as made:
-        with name_errors(path):
-            if is_special := _is_special(path):
-                with _open_special(path) as file:
-                    write_stream(file, (piece.data for piece in pieces), str(path))
-            else:
-                check_writable(path)
-            if not is_special and not has_bytes(target, pieces):
-                temporary = write_temporary(target, pieces, made)
+    with stage(path, pieces) as commit:
         yield
+        commit()
+
+
+@contextmanager
+def stage(path: Path, pieces: Sequence[Bytes]) -> Iterator[Callable[[], None]]:
+    """Write one file as a temporary sibling, until the end of the block; give the function that renames it.
+
+    Special files are written at once.
+    """
+    target, temporary = resolver.resolve_links(path), None
+    is_special = special_files.is_special(path)
+
+    def commit() -> None:
+        before_commit.run_job()
         with name_errors(path):
             if temporary is not None:
                 os.replace(temporary, target)
             elif not is_special:
                 os.utime(target)
 
-
-def _is_special(path: Path) -> bool:
-    """Return whether a path is written directly: a device, a named pipe, or what this process has open."""
-    return descriptor_of(path) is not None or (path.exists() and not path.is_file())
-
-
-def _open_special(path: Path) -> BinaryIO:
-    """Open it for writing: an open file at its position, which opening its path again would lose."""
-    number = descriptor_of(path)
-    return path.open("wb", buffering=0) if number is None else os.fdopen(os.dup(number), "wb", buffering=0)
-
-
-def descriptor_of(path: Path) -> int | None:
-    """Return the number of the open file that a path names: 1 of /dev/stdout, 3 of /dev/fd/3; None for other paths."""
-    found = re.fullmatch(r"/dev/(?:(stdout)|(stderr)|fd/(\d{1,9}))|/proc/self/fd/(\d{1,9})", str(path))
-    if found is None:
-        return None
-    return 1 if found[1] else 2 if found[2] else int(found[3] or found[4])
+    with temporary_files() as made:
+        if is_special:
+            before_commit.run_job()
+        with name_errors(path):
+            if is_special:
+                with special_files.open_special(path) as file:
+                    write_stream(file, (piece.data for piece in pieces), str(path))
+            else:
+                check_writable(path)
+                temporary = None if has_bytes(target, pieces) else write_temporary(target, pieces, made)
+        yield commit
 
 
 @dataclass
@@ -105,7 +100,7 @@ class AtomicOutputs:
     def create(self, name: str) -> BinaryIO:
         """Return a new file of this name, open for writing and reading."""
         path = self.folder / name
-        if _is_special(path):  # companions of /dev/null would be in a shared folder
+        if special_files.is_special(path):  # companions of /dev/null would be in a shared folder
             path = Path(tempfile.gettempdir()) / name
         with signals.hold_signals():  # one in between would leave a file that nobody knows
             handle, self.files[name] = create_temporary(path)
@@ -118,13 +113,14 @@ class AtomicOutputs:
         """
         import filecmp
 
+        before_commit.run_job()
         main = self.main if self.main in self.files else min(self.files)
         with lock_folder(self.folder):
             new = {}
             for name, temporary in self.files.items():
                 path = self.folder / name
-                if _is_special(path):
-                    with temporary.open("rb") as source, _open_special(path) as target:
+                if special_files.is_special(path):
+                    with temporary.open("rb") as source, special_files.open_special(path) as target:
                         write_stream(target, iter(lambda: source.read(BLOCK_BYTES), b""), str(path))
                     continue
                 check_writable(path)
@@ -138,34 +134,6 @@ class AtomicOutputs:
         for temporary in self.files.values():
             with suppress(OSError):
                 temporary.unlink()
-
-
-@contextmanager
-def lock_folder(folder: Path) -> Iterator[None]:
-    """Lock a folder against concurrent changes of file sets, if the system supports it.
-
-    The lock leaves no file and ends with the process. After 5 s the block runs without it.
-    """
-    try:
-        import fcntl
-
-        handle = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):
-        yield
-        return
-    try:
-        end = time.monotonic() + MAX_LOCK_WAIT_S
-        while time.monotonic() < end:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                time.sleep(LOCK_POLL_S)
-            except OSError:  # a file system without locks
-                break
-        yield
-    finally:
-        os.close(handle)
 
 
 @contextmanager

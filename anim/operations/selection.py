@@ -12,6 +12,8 @@ import numpy as np
 from anim.errors import NotFoundError, RangeError, ShapeError, check_type
 from anim.model import Clip, Skeleton
 
+MAX_SUGGESTED = 3  # names
+
 
 class Selection(NamedTuple):
     """Globs for names of clips and nodes, and paths of tracks; empty selects all."""
@@ -63,7 +65,8 @@ def track_indices(clip: Clip, tracks: Collection[int] | None) -> frozenset[int]:
 def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
     """Return the indices of the names that match any of the globs; all without globs.
 
-    "#3" is index 3, with any name. A glob that is a name itself, "Run[1]", is that name only.
+    "#3" is index 3, with any name. A glob that is a name itself, "Run[1]", is that name only. Upper and lower case
+    differ.
     Raises NotFoundError, with similar names, for a glob that matches none.
     """
     if not globs:
@@ -90,6 +93,8 @@ def _matches(glob: str, names: Sequence[str]) -> set[int]:
 
 def _suggestion(glob: str, names: Iterable[str], what: str) -> str:
     known = list(dict.fromkeys(names))
+    if respelled := _in_other_case(glob, known):
+        return f"upper and lower case differ: did you mean {respelled}?"
     folded = {name.casefold(): name for name in known}
     near = difflib.get_close_matches(glob.casefold(), folded, n=1)
     if near:
@@ -98,6 +103,15 @@ def _suggestion(glob: str, names: Iterable[str], what: str) -> str:
         return f"the file has no {_plural(what)}"
     listed = ", ".join(f"'{name}'" for name in known[:8])
     return f"the {_plural(what)} are {listed}{f' and {len(known) - 8} more' if len(known) > 8 else ''}"
+
+
+def _in_other_case(glob: str, names: Sequence[str]) -> str:
+    """The glob in the case of the names that it matches apart from case, or some of these names; "" without any."""
+    found = [name for name in names if fnmatchcase(name.casefold(), glob.casefold())]
+    for spelled in (glob.lower(), glob.upper(), glob.title(), glob.capitalize()):
+        if found and all(fnmatchcase(name, spelled) for name in found):
+            return f"'{spelled}'"
+    return " or ".join(f"'{name}'" for name in found[:MAX_SUGGESTED])
 
 
 def _plural(nouns: str) -> str:

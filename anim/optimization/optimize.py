@@ -24,7 +24,7 @@ from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification
 from anim.optimization.writing import changed_clips, write_solutions
-from anim.sampling.times import check_duration
+from anim.sampling.times import SHORTER_CLIP, check_duration
 
 SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
 BATCH_KEYS = 300  # times of possible keys, in all, of clips that are optimized side by side: twice as many are measured
@@ -163,9 +163,9 @@ def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, T
 
 
 def _check_durations(clips: Sequence[Clip], chosen: Sequence[int]) -> None:
-    """Raise DataRangeError for a clip that lasts too long to measure between keys, as `frame_times` does."""
+    """Raise UnsupportedError for a clip that lasts too long to measure between keys, as `frame_times` does."""
     for number in chosen:
         try:
-            check_duration(0.0, clips[number].end, fps=FPS)
+            check_duration(0.0, clips[number].end, fps=FPS, help=SHORTER_CLIP)
         except AnimError as error:
             raise error.at(reader.clip_label(clips[number].name, number)) from None

@@ -12,14 +12,15 @@ import numpy as np
 
 from anim import arrays
 from anim.arrays import Floats, Ints
-from anim.errors import DataRangeError, RangeError, UnsupportedError, check_number
+from anim.errors import RangeError, UnsupportedError, check_number
 
 MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
 )
 MAX_FRAMES = 10_000_000
-MAX_USUAL_FPS = 1000.0
 MAX_MOVED_STEPS = 2  # float32 steps that a key may be moved by to differ from its neighbor
+FEWER_FRAMES = "choose a lower `fps`, or shorten the motion with gltf-anim trim"
+SHORTER_CLIP = "shorten the clip with gltf-anim trim, or choose others with `clip`"  # where the rate is no option
 FLOAT32_SPACING = 2.0**-23  # relative distance of neighboring float32 numbers
 MIN_JUMP_S = 1e-6  # s; shortest time between two keys that represent a jump, to avoid denormal times near 0 s
 MAX_JUMP_S = 1.5e-6  # s; with two float32 steps, the longest time between two keys that represent a jump
@@ -32,31 +33,36 @@ def check_fps(fps: float) -> None:
         raise RangeError(f"`fps` is {fps:g} (expected a number above 0)")
 
 
-def check_duration(start: float, end: float, *, fps: float) -> float:
-    """Return the number of frames from `start` to `end` s, not rounded.
+def check_duration(start: float, end: float, *, fps: float, help: str = FEWER_FRAMES) -> float:
+    """Return the number of frames from `start` to `end` s, not rounded. Raises UnsupportedError for ten million.
 
-    Raises DataRangeError for over ten million frames of a long clip, and UnsupportedError for as many at a rate that no
-    clip has.
+    help: the way out, for the message.
     """
     frames = (end - start) * fps
     if frames > MAX_FRAMES:
-        kind = DataRangeError if fps <= MAX_USUAL_FPS else UnsupportedError  # the clip is too long, or the rate high
-        raise kind(f"{frames:.3g} frames at {fps:g} fps (limit {MAX_FRAMES})")
+        raise too_many_frames(frames, fps, help=help)
     return frames
 
 
-def frame_times(start: float, end: float, *, fps: float) -> Floats:
+def too_many_frames(
+    frames: float, fps: float, *, limit: int = MAX_FRAMES, help: str = FEWER_FRAMES
+) -> UnsupportedError:
+    """Return the error for more frames than the limit, whether the motion is too long or the rate too high."""
+    return UnsupportedError(f"{frames:.3g} frames at {fps:g} fps (limit {limit})", help=help)
+
+
+def frame_times(start: float, end: float, *, fps: float, help: str = FEWER_FRAMES) -> Floats:
     """Return the frame times (F,) in seconds from `start` to `end`, both of them exact.
 
-    fps: frames per second, > 0. Raises RangeError otherwise. Raises DataRangeError for over ten million frames of a
-    long clip, and UnsupportedError for as many at a rate that no clip has.
+    fps: frames per second, > 0. Raises RangeError otherwise, and UnsupportedError, with `help`, for over ten million
+    frames.
     frame_times(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
     frame_times(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
     """
     check_number(start, "start")
     check_number(end, "end")
     check_fps(fps)
-    frames = check_duration(start, end, fps=fps)
+    frames = check_duration(start, end, fps=fps, help=help)
     sliver = max(MIN_INTERVAL_FRAMES, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)
     times = start + np.arange(whole, dtype=np.float64) / fps

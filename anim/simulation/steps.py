@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError, check_number
+from anim.errors import RangeError, UnsupportedError, check_number
 from anim.memory import MemoryBudget
 from anim.sampling.times import check_duration, check_fps, frame_times
 
 MAX_STEPS = 10_000_000
+FEWER_STEPS = "choose a shorter `duration`, or a longer `step`"
 SHORTER = "choose a shorter `duration`, a lower `fps` or a longer `step`, or raise `memory_limit`"
 
 
@@ -24,7 +25,7 @@ SHORTER = "choose a shorter `duration`, a lower `fps` or a longer `step`, or rai
 class Steps:
     """Fixed steps of `step_s` seconds from −`warm_up_s` to at least `duration_s`; frames are written from 0 on.
 
-    Raises RangeError for a step that isn't above 0, negative lengths, or more than ten million steps.
+    Raises RangeError for a step that isn't above 0 and negative lengths, UnsupportedError for over ten million steps.
     """
 
     step_s: float
@@ -37,7 +38,7 @@ class Steps:
             if not math.isfinite(value) or value < 0 or (value == 0 and name == "step"):
                 raise RangeError(f"`{name}` is {value:g} s (expected {'above 0' if name == 'step' else 'at least 0'})")
         if (self.duration_s + self.warm_up_s) / self.step_s > MAX_STEPS:
-            raise RangeError(f"more than {MAX_STEPS} steps of {self.step_s:g} s")
+            raise UnsupportedError(f"more than {MAX_STEPS} steps of {self.step_s:g} s", help=FEWER_STEPS)
 
     @property
     def num_steps(self) -> int:

@@ -134,8 +134,7 @@ def command(
         reporter.warn(f"{cache.chosen}; bake takes others by --clip")
     for words in loaded.notes:
         reporter.warn(words)
-    for note in saved.written.notes:
-        reporter.info(f"note: {note}")
+    saved.report(reporter)
     name = loaded.name if output == documents.PIPE else output
     parts = [
         f"{name}  {text.format_change(size, saved.size)}",

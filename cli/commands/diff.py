@@ -2,42 +2,34 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from pathlib import PurePath
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import typer
 
 from anim.errors import AnimError
-from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
-from anim.gltf.reading.accessors import Accessors
 from anim.measure.compare.diff import diff as compared
 from anim.measure.compare.equal_scenes import store_alike
-from anim.measure.compare.name_matching import ambiguous_names, match_by_name
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import FPS
 from anim.measure.error.surface import diagonal, is_measured_at
-from anim.measure.inspect.storage_cost import StorageCost, storage_costs
-from anim.measure.inspect.stored_bytes import stored_bytes
-from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
-from anim.units import is_zero, plural
+from anim.units import is_zero
 from cli import units
 from cli.errors import CheckError, UsageError
-from cli.io import documents, scenes
+from cli.io import documents
 from cli.options import common
 from cli.options.common import Format
 from cli.reports import diff_report, vertex_report
-from cli.reports.diff_report import DiffReport, File
+from cli.reports.diff_report import DiffReport
 from cli.reports.vertex_report import VertexReport
 from cli.text import Reporter, format_bytes, format_length
-from cli.workflows.mesh_pairs import is_bake_of, pages_of
+from cli.workflows.diff_side import DiffSide, ambiguous_clips, are_bake_and_source, common_names, open_side
 
 Player = StrEnum("Player", [(name, name) for name in PLAYERS])  # type: ignore[misc]
 SPEC = Player("spec")
@@ -123,11 +115,11 @@ def command(
             raise UsageError("--html shows two files as glTF specifies (expected neither --player nor --players)")
     one = other = None
     if not (_is_cache(old) or _is_cache(new)):
-        one = _opened(old, reporter)
-        other = one if new is None else _opened(new, reporter)
+        one = open_side(old, reporter)
+        other = one if new is None else open_side(new, reporter)
         first, second = store_alike(one.scene, other.scene)
         one, other = one._replace(scene=first), other._replace(scene=second)
-    if new is not None and (one is None or other is None or _are_bake_and_source(one, other)):
+    if new is not None and (one is None or other is None or are_bake_and_source(one, other)):
         if plot is not None or player is not SPEC:
             raise UsageError(f"{'--plot' if plot is not None else '--player'} does not apply to caches and bakes")
         opened = {
@@ -156,10 +148,12 @@ def command(
         found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
     except AnimError as error:
         raise error.at(one.file.name, ": ") from None
-    report = DiffReport(one.file, other.file, found, *_names(one, other), who, fps, radius, is_measured_at(one.scene))
+    report = DiffReport(
+        one.file, other.file, found, *common_names(one, other), who, fps, radius, is_measured_at(one.scene)
+    )
     if report.are_strangers:
         reporter.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
-    for words in _ambiguous(one.file, other.file, chosen):
+    for words in ambiguous_clips(one.file, other.file, chosen):
         reporter.warn(words)
     for words in () if report.are_strangers else found.warnings:
         reporter.warn(f"{other.file.name}: {words}")
@@ -182,8 +176,8 @@ def _write_page(
     path: str,
     report: DiffReport,
     ruler: ErrorMetric,
-    one: tuple[str, _Side],
-    other: tuple[str, _Side],
+    one: tuple[str, DiffSide],
+    other: tuple[str, DiffSide],
     reporter: Reporter,
 ) -> None:
     """Write the page of both files, with the table of clips."""
@@ -204,12 +198,6 @@ def _is_cache(path: str | None) -> bool:
     from cli.workflows.vertex_diff import is_cache  # imports all cache formats
 
     return is_cache(path)
-
-
-def _are_bake_and_source(one: _Side, other: _Side) -> bool:
-    is_book = one.is_flipbook or other.is_flipbook
-    counts = len(one.clips), len(other.clips)
-    return is_book or is_bake_of(one.scene, other.scene, counts[1]) or is_bake_of(other.scene, one.scene, counts[0])
 
 
 def _by_vertex(
@@ -243,52 +231,6 @@ def _players(new: str | None, player: str, players: str | None) -> str:
     if first == second:
         raise UsageError(f"--players is '{players}' (expected two different ones of {', '.join(PLAYERS)})")
     return players
-
-
-class _Side(NamedTuple):
-    """One of the two inputs, read."""
-
-    file: File
-    clips: tuple[Clip, ...]
-    scene: Scene
-    document: Document
-
-    @property
-    def is_flipbook(self) -> bool:
-        """Return whether the frames are pages."""
-        return pages_of(self.document) is not None
-
-
-def _opened(path: str, reporter: Reporter) -> _Side:
-    with documents.source(path, reporter) as source:
-        document = source.document
-        accessors = Accessors(document)
-        clips = reader.clips(document, accessors)
-        scene = scenes.read_scene(document, source.name, reporter, accessors=accessors, repeats=False)
-        if scene.instances and reader.is_default_scene_empty(document):
-            reporter.warn(f"{source.name}: the default scene has no mesh, most players show nothing")
-        cost = StorageCost(stored_bytes(document), storage_costs(document)[1].json)
-        return _Side(File(source.name, source.size, cost, tuple(clip.name for clip in clips)), clips, scene, document)
-
-
-def _names(one: _Side, other: _Side) -> tuple[int, bool]:
-    """Number of nodes of one whose name exists in the other, and whether both files have node names."""
-    nodes = one.scene.skeleton.names, other.scene.skeleton.names
-    are_named = all(any((*side.file.clips, *names)) for side, names in zip((one, other), nodes, strict=True))
-    return int((match_by_name(*nodes) >= 0).sum()), are_named
-
-
-def _ambiguous(one: File, other: File, chosen: Sequence[int] | None) -> Iterator[str]:
-    """Yield notes on clip names with another count in the other file. chosen: clip indices of A."""
-    looked_at = set(one.clips if chosen is None else (one.clips[i] for i in chosen))
-    numbers = Counter(one.clips), Counter(other.clips)
-    for name in ambiguous_names(one.clips, other.clips):
-        if name in looked_at:
-            counts = numbers[0][name], numbers[1][name]
-            yield (
-                f"{one.name} has {plural(counts[0], 'clip')} named '{name}' and {other.name} has {counts[1]}: "
-                "they are matched in their order, which may be wrong"
-            )
 
 
 def _check(found: DiffReport, limit: float) -> None:

@@ -22,6 +22,7 @@ from anim.model import VertexCache
 from anim.units import plural
 from cli.errors import UsageError
 from cli.io import cache_folders, documents
+from cli.text import Reporter
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +43,22 @@ class LoadedCache:
 
 @dataclass(frozen=True, slots=True)
 class SavedCache:
-    """Written files, the main one last, their total size in bytes, and notes."""
+    """Written files, the main one last, their total size in bytes, and notes.
+
+    orphans: warnings of frames of before, which programs read as a part of what was written.
+    """
 
     files: tuple[str, ...]
     size: int
     written: WriteResult
+    orphans: tuple[str, ...] = ()
+
+    def report(self, reporter: Reporter) -> None:
+        """Report warnings and notes."""
+        for words in self.orphans:
+            reporter.warn(words)
+        for note in self.written.notes:
+            reporter.info(f"note: {note}")
 
 
 @contextmanager
@@ -129,8 +141,9 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
         finally:
             staged.clear()
     lost = unsupported_notes(cache, ending)
-    left = unwritable_note(staged.names[:-1]) if is_pipe else orphans_note(path, names, ending)
-    return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)))
+    left = unwritable_note(staged.names[:-1]) if is_pipe else ()
+    orphans = () if is_pipe else orphan_warnings(path, names, ending)
+    return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)), orphans)
 
 
 def _ending(inputs: cache_folders.CacheFolder) -> str:
@@ -160,16 +173,17 @@ def unwritable_note(names: Sequence[str]) -> tuple[str, ...]:
     return (f"not written, since the output is a pipe: {', '.join(names)}",) if names else ()
 
 
-def orphans_note(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
-    """Return the note on frames of an earlier sequence beside those written to `path`."""
+def orphan_warnings(path: str, written: Sequence[str], ending: str) -> tuple[str, ...]:
+    """Return the warnings of frames of an earlier sequence beside those written to `path`."""
     if CACHE_FORMATS[ending].files is not Files.FRAMES:
         return ()
     target, there = resolver.resolve_links(Path(path)), []
     with suppress(OSError):
         there = os.listdir(target.parent)
-    notes = []
+    found = []
     if old := [name for name in mesh_sequence.sequence_files(target.name, there) if name not in written]:
-        notes.append(f"{plural(len(old), 'frame')} of before still there, from {old[0]} on")
+        frames = plural(len(old), "frame")
+        found.append(f"{frames} of before still there, from {old[0]} on: what reads the sequence reads them too")
     if target.name in there and target.name not in (*written, *old):
-        notes.append(f"{target.name} of before is still there, and is what that name reads")
-    return tuple(notes)
+        found.append(f"{target.name} of before is still there, and is what that name reads")
+    return tuple(found)

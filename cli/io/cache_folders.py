@@ -16,7 +16,8 @@ from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError, not_written
 from anim.files import resolver
-from anim.files.atomic import AtomicOutputs, descriptor_of
+from anim.files.atomic import AtomicOutputs
+from anim.files.special_files import descriptor_of
 from cli.errors import UsageError
 from cli.io import depfile, documents
 

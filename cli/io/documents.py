@@ -142,19 +142,23 @@ def write_bytes(pieces: Iterable[Bytes], path: str) -> None:
 
 
 def write_text(text: str | bytes, path: str = PIPE) -> None:
-    """Write text to a file atomically, or to stdout: UTF-8 in any locale.
-
-    text: bytes if it is encoded already. A lone surrogate, which JSON strings can contain and UTF-8 can't, is written
-    as its JSON escape: \\ud83d.
-    """
+    """Write text to a file atomically, or to stdout, as `encode` does."""
     with commit_text_after(text, path):
         pass
+
+
+def encode(text: str | bytes) -> bytes:
+    """Return text in UTF-8, in any locale; bytes are encoded already.
+
+    A lone surrogate, which JSON strings can contain and UTF-8 can't, is written as its JSON escape: \\ud83d.
+    """
+    return text if isinstance(text, bytes) else text.encode(errors="backslashreplace")
 
 
 @contextmanager
 def commit_text_after(text: str | bytes, path: str) -> Iterator[None]:
     """Write text like `write_text`; a file is replaced after the block, or not at all if the block fails."""
-    data = text if isinstance(text, bytes) else text.encode(errors="backslashreplace")
+    data = encode(text)
     if path == PIPE:
         stdout.write([data])
         yield

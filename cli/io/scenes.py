@@ -8,7 +8,7 @@ from anim.errors import AnimError
 from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.reader import INSTANCING, instanced_nodes
+from anim.gltf.reading.scene_nodes import INSTANCING, instanced_nodes, mesh_nodes_of_other_scenes
 from anim.gltf.validation.channel_targets import has_weight_pointers
 from anim.model import Scene, Skeleton
 from anim.sampling.weight_pointers import ineffective_weight_pointers
@@ -87,7 +87,7 @@ def _warn_of_copies(document: Document, name: str, reporter: Reporter, chosen: C
 
 def warn_of_other_scenes(document: Document, name: str, reporter: Reporter, chosen: Collection[int] | None) -> None:
     """Warn of meshes that aren't in the default scene: players don't show them. chosen: nodes, None for all."""
-    other = [i for i in reader.mesh_nodes_of_other_scenes(document) if chosen is None or i in chosen]
+    other = [i for i in mesh_nodes_of_other_scenes(document) if chosen is None or i in chosen]
     if other:
         label = node_label(document.json, other[0])
         subject = f"{label} and {len(other) - 1} more are" if len(other) > 1 else f"{label} is"

@@ -37,7 +37,9 @@ def report_written(done: Sequence[BakedFile], reporter: Reporter, *, dry_run: bo
 
 
 def report_notes(done: Sequence[BakedFile], reporter: Reporter) -> None:
-    """Report every note once, with its files unless it applies to all."""
+    """Report warnings, and every note once, with its files unless it applies to all."""
+    for words in dict.fromkeys(words for each in done for words in each.saved.orphans):
+        reporter.warn(words)
     files: dict[str, list[str]] = {}
     for each in done:
         for note in each.saved.written.notes:

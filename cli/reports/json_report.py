@@ -29,7 +29,8 @@ def check_finite(content: object) -> None:
     """Raise FormatError, with the path of the number, if a report contains NaN or infinity."""
     for where, value in _not_finite(content, ""):
         raise FormatError(
-            f"{where} is {value}: no report of it is possible", help="the file has values beyond those of float32"
+            f"{where} is {value}: no report of it is possible",
+            help="values of the file, or products of them, are too large",
         )
 
 

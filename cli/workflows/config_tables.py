@@ -58,7 +58,7 @@ def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
 def _table(path: Path) -> dict[str, Any] | None:
     """The settings in a file, None if it has none."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         return None
     except RecursionError:

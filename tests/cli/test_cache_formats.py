@@ -124,12 +124,13 @@ def test_frames_of_a_longer_sequence_are_said_and_kept(walk: Path, call: Call) -
     assert "of before" not in call("convert-cache", walk, out).err
     assert "of before" not in call("convert-cache", walk, out).err
     run = call("convert-cache", walk, out, "--fps", "10")
-    assert "note: 4 frames of before still there, from s_00004.obj on\n" in run.err
+    words = "4 frames of before still there, from s_00004.obj on: what reads the sequence reads them too"
+    assert f"warning: {words}\n" in run.err
     assert len(list(walk.parent.glob("s_*.obj"))) == 7
     run = call("convert-cache", walk, out, "--at", "0")
-    assert "note: 7 frames of before still there, from s_00001.obj on\n" in run.err
-    run = call("convert-cache", walk, out)
-    assert "note: s.obj of before is still there, and is what that name reads\n" in run.err
+    assert "warning: 7 frames of before still there, from s_00001.obj on: " in run.err
+    run = call("convert-cache", walk, out, "-q")
+    assert "warning: s.obj of before is still there, and is what that name reads\n" in run.err
 
 
 def test_uneven_frames_are_said(tmp_path: Path, call: Call) -> None:

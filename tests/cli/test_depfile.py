@@ -18,7 +18,7 @@ from cli.command_table import COMMANDS
 from cli.commands import simulate
 from cli.io import depfile
 from tests.cli.conftest import Call, Find
-from tests.cli.running import ENVIRONMENT, built
+from tests.cli.running import ENVIRONMENT, built, refusal, shell
 
 
 @pytest.fixture
@@ -82,6 +82,51 @@ def test_wrong_names_are_refused(output: str, options: list[str], problem: str, 
     assert (run.code, run.text) == (2, "")
     assert problem in run.err
     assert not (folder / "out.glb").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+@pytest.mark.parametrize(
+    "line",
+    [
+        "retime noop.glb out.glb --speed 2",
+        "convert noop.glb out.gltf",
+        "bake 'crowd/arm 1.glb' out.npz --clip bend --fps 2",
+        "sample noop.glb out.csv --at 0",
+    ],
+)
+def test_outputs_stay_as_they_were_if_the_rule_cannot_be_written(line: str, folder: Path) -> None:
+    """As on a full disk."""
+    for name in ("out.glb", "out.gltf", "out.npz", "out.csv"):
+        (folder / name).write_bytes(b"before")
+    run = shell(f"gltf-anim {line} --depfile /dev/full", folder)
+    assert refusal(run, 3) == "gltf-anim: /dev/full: can't be written (no space left on device)"
+    assert {path.read_bytes() for path in folder.glob("out*")} == {b"before"}
+    assert len(list(folder.glob("out*"))) == 4
+
+
+def test_a_rule_for_a_pipe_is_written_once(folder: Path) -> None:
+    run = shell("gltf-anim convert noop.glb out.glb -q --depfile /dev/stdout", folder)
+    assert run.product().decode() == rule("out.glb", "noop.glb")
+    run = shell("gltf-anim bake 'crowd/arm 1.glb' '{clip}.npz' -q --fps 2 --depfile /dev/stdout", folder)
+    assert run.product().count(b".npz") == len(list(folder.glob("*.npz")))
+
+
+def test_no_rule_is_left_if_the_output_cannot_be_written(
+    folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "x.d").write_text("before")
+    replace = os.replace
+
+    def fail(source: Path, target: Path) -> None:
+        if target.name == "out.glb":
+            raise OSError(28, "No space left on device")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", fail)
+    run = call("retime", folder / "noop.glb", folder / "out.glb", "--speed", "2", "--depfile", folder / "x.d")
+    assert run.code == 3
+    assert (folder / "x.d").read_text() == "before"
+    assert not list(folder.glob(".*"))
 
 
 def test_an_input_is_not_replaced(folder: Path, call: Call) -> None:

@@ -11,7 +11,7 @@ import pytest
 from anim.errors import FormatError
 from anim.model import FrameChunk
 from cli.reports import json_report
-from fixtures.broken.pieces import buffered, text
+from fixtures.broken.pieces import animated, buffered, text
 from tests.cli.conftest import Call, Find
 from tests.cli.running import built, refusal
 from tests.files import opened_path
@@ -30,6 +30,19 @@ def huge(asset: Find, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def infinite(tmp_path: Path) -> Path:
+    """A node below nine others that are scaled by 1e38: its motion is beyond float64."""
+    document = animated()
+    above = [{"scale": [1e38] * 3, "children": [i + 1]} for i in range(1, 10)]
+    document["nodes"] += [*above, {}]
+    document["scenes"] = [{"nodes": [0, 1]}]
+    document["animations"][0]["channels"][0]["target"]["node"] = 10
+    path = tmp_path / "infinite.gltf"
+    path.write_bytes(text(document))
+    return path
+
+
 @pytest.mark.parametrize("ending", CACHES)
 def test_a_bake_beyond_float32_is_refused(ending: str, huge: Path, call: Call, tmp_path: Path) -> None:
     pytest.importorskip({"exr": "OpenEXR", "usda": "pxr"}.get(ending, "numpy"))
@@ -44,18 +57,31 @@ def test_frames_beyond_float32_are_refused(line: list[str], huge: Path, call: Ca
     assert "frame 0: vertex 2 is beyond float32" in refusal(call(command, huge, *others), 3)
 
 
-def test_a_report_of_infinity_is_refused(huge: Path, call: Call) -> None:
-    said = refusal(call("loop", huge, "--format", "json"), 3)
+@pytest.mark.parametrize("line", ["inspect", "inspect --continuity --tracks", "loop", "loop --find", "check"])
+def test_values_near_the_end_of_float32_are_reported(line: str, call: Call, tmp_path: Path) -> None:
+    """Their squares are far beyond it."""
+    path = tmp_path / "a.gltf"
+    path.write_bytes(text(animated(values=((0, 0, 0), (3.4e38, -3.4e38, 3.4e38)))))
+    command, *options = line.split()
+    report = call(command, path, "--format", "json", *options).json
+    if command == "inspect":
+        (clip,) = report["files"][0]["clips"]
+        assert clip["seam_m"] == pytest.approx(3.4e38 * np.sqrt(3))
+        assert clip["seam_speed_m_per_s"] < 1e-9 * clip["seam_m"]
+
+
+def test_a_report_of_infinity_is_refused(infinite: Path, call: Call) -> None:
+    said = refusal(call("loop", infinite, "--format", "json"), 3)
     assert "no report of it is possible" in said
 
 
-def test_infinity_in_one_file_does_not_cost_the_entries_of_others(huge: Path, asset: Find, call: Call) -> None:
+def test_infinity_in_one_file_does_not_cost_the_entries_of_others(infinite: Path, asset: Find, call: Call) -> None:
     plain = asset("SimpleSkin.gltf")
-    run = call("inspect", huge, plain, "--format", "json", "--continuity")
+    run = call("inspect", infinite, plain, "--format", "json", "--continuity")
     bad, good = json.loads(run.out)["files"]
     assert run.code == 3
-    assert f"{huge}: clips[0].seam_speed_m_per_s is nan: no report of it is possible" in run.err
-    assert "clips[0].seam_speed_m_per_s is nan" in bad["error"]
+    assert f"{infinite}: clips[0].seam_m is nan: no report of it is possible" in run.err
+    assert "clips[0].seam_m is nan" in bad["error"]
     assert good == json.loads(call("inspect", plain, "--format", "json", "--continuity").product())["files"][0]
 
 

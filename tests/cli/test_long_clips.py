@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.running import built, refusal
+from tests.cli.running import built, help_line, refusal
 
 HOURS_S = 60_000.0
+MONTHS_S = 1.6e7
 
 
 @pytest.fixture
@@ -41,3 +42,45 @@ def test_frames_of_a_long_clip_count(line: str, out: str, long: Path, call: Call
     run = call(command, long, tmp_path / out, *options, *clip)
     assert "would take" in refusal(run, 4)
     assert list(tmp_path.iterdir()) == [long]
+
+
+@pytest.mark.parametrize(
+    ("line", "out", "advice"),
+    [
+        ("resample --fps 30", "out.glb", "a lower --fps"),
+        ("optimize", "out.glb", "--clip"),
+        ("diff", "", "--clip"),
+        ("spline --tangents natural", "out.glb", "--clip"),
+        ("loop --blend 0.2", "out.glb", "--clip"),
+        ("collapse", "", "--samples-per-second"),
+        ("sample --fps 10", "out.csv", "a lower --fps"),
+        ("to-euler --fps 10", "out.bvh", "a lower --fps"),
+        ("convert", "out.usdc", "a lower --fps"),
+        ("bake --fps 30", "out.npz", "a lower --fps"),
+        ("bake --fps 30", "out.glb", "a lower --fps"),
+        ("render", "out.gif", "--from"),
+        ("simulate springs --chain *", "out.glb", "--duration"),
+        ("simulate cloth --mesh *", "out.npz", "--duration"),
+        ("simulate particles --node *", "out.glb", "--duration"),
+    ],
+)
+def test_clips_of_months_are_refused_alike(line: str, out: str, advice: str, call: Call, tmp_path: Path) -> None:
+    """A limit of resources is exit 4, whichever of file and options is to blame, and says what helps."""
+    if out.endswith(".usdc"):
+        pytest.importorskip("pxr")
+    endless = tmp_path / "endless.glb"
+    endless.write_bytes(built("tube"))
+    call("retime", endless, endless, "--duration", str(MONTHS_S)).product()
+    words = line.split()
+    number = 2 if words[0] == "simulate" else 1
+    files = [endless, endless] if words[0] == "diff" else [endless, tmp_path / out] if out else [endless]
+    run = call(*words[:number], *files, *words[number:], "--clip", "#0")
+    assert refusal(run, 4).startswith(f"gltf-anim: {endless}: ")
+    assert advice in help_line(run)
+    assert list(tmp_path.iterdir()) == [endless]
+
+
+def test_a_number_of_pictures_has_its_own_limit(long: Path, call: Call, tmp_path: Path) -> None:
+    run = call("render", long, tmp_path / "out.gif", "--clip", "#0")
+    assert "frames at 24 fps (limit 3000)" in refusal(run, 4)
+    assert "--frames" in help_line(run)

@@ -17,7 +17,7 @@ import pytest
 
 from anim.arrays import Floats, Ints
 from anim.gltf.reading import reader
-from anim.maths import euler, hierarchy
+from anim.maths import hierarchy
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.loops import loop_analysis
@@ -30,7 +30,6 @@ from fixtures.broken.pieces import buffered, text
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
-from tests.cli.running import refusal
 from tests.files import clips_of, opened_path
 
 NODES = 2000, 6000
@@ -168,14 +167,6 @@ def test_every_equal_clip_is_changed_and_listed(call: Call, tmp_path: Path) -> N
     assert [each["clip"] for each in report["clips"]] == ["c0", "c1", "c2"]
 
 
-def test_a_column_twice_among_many(call: Call, tmp_path: Path) -> None:
-    header = ",".join(["time", *(f"n{i}.rx" for i in range(40_000)), "n39999.rx"])  # minutes if it were quadratic
-    (tmp_path / "a.csv").write_text(f"{header}\n")
-    line = ("--order", "XYZ", "--axes", "extrinsic", "--unit", "deg")
-    said = refusal(call("from-euler", tmp_path / "a.csv", tmp_path / "out.glb", *line), 3)
-    assert "column 'n39999.rx' twice" in said
-
-
 @pytest.mark.slow
 def test_curves_whose_children_come_before_their_parents(call: Call, tmp_path: Path) -> None:
     (tmp_path / "arm.gltf").write_bytes(chain(2))
@@ -204,27 +195,6 @@ def test_a_deep_chain_of_moving_nodes_is_not_refined(
         counted.clear()
     assert paths[0][0] > 0
     assert paths[1] == (0, True)
-
-
-def test_a_bvh_of_a_long_chain_is_as_long_as_the_chain(call: Call, tmp_path: Path) -> None:
-    """Not as its square, by tabs; and it is read again."""
-    sizes = []
-    for count in (300, 600):
-        (tmp_path / "in.glb").write_bytes(many.chain_open(count))
-        call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh").product()
-        sizes.append(len((tmp_path / "out.bvh").read_bytes()))
-    assert sizes[1] < 2.1 * sizes[0]
-    call("from-euler", tmp_path / "out.bvh", tmp_path / "again.glb").product()
-    assert len(opened_path(tmp_path / "again.glb").json["nodes"]) == 601  # with its end site
-
-
-def test_a_bvh_computes_angles_of_many_nodes_at_once(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    counted = count_calls(monkeypatch, euler, "unwrap")
-    (tmp_path / "in.glb").write_bytes(many.side_moving(500))
-    call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh", "--clip", "#0").product()
-    assert 0 < len(counted) < 5
 
 
 @pytest.mark.slow

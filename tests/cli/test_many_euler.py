@@ -17,6 +17,8 @@ from anim.maths.euler import AxesConvention
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
+from tests.cli.running import refusal
+from tests.files import opened_path
 
 
 @pytest.mark.parametrize(("make", "suffix"), [(many.json_curves, ".json"), (many.csv_columns, ".csv")])
@@ -66,3 +68,32 @@ def test_curves_of_a_bvh_share_their_modes(call: Call, tmp_path: Path, monkeypat
     counted = [count_calls(monkeypatch, module, "uniform_modes") for module in (curve, to_bvh_motion)]
     call("to-euler", tmp_path / "in.glb", tmp_path / "a.bvh", "--clip", "#0").product()
     assert sum(map(len, counted)) == 1
+
+
+def test_a_column_twice_among_many(call: Call, tmp_path: Path) -> None:
+    header = ",".join(["time", *(f"n{i}.rx" for i in range(40_000)), "n39999.rx"])  # minutes if it were quadratic
+    (tmp_path / "a.csv").write_text(f"{header}\n")
+    line = ("--order", "XYZ", "--axes", "extrinsic", "--unit", "deg")
+    said = refusal(call("from-euler", tmp_path / "a.csv", tmp_path / "out.glb", *line), 3)
+    assert "column 'n39999.rx' twice" in said
+
+
+def test_a_bvh_of_a_long_chain_is_as_long_as_the_chain(call: Call, tmp_path: Path) -> None:
+    """Not as its square, by tabs; and it is read again."""
+    sizes = []
+    for count in (300, 600):
+        (tmp_path / "in.glb").write_bytes(many.chain_open(count))
+        call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh").product()
+        sizes.append(len((tmp_path / "out.bvh").read_bytes()))
+    assert sizes[1] < 2.1 * sizes[0]
+    call("from-euler", tmp_path / "out.bvh", tmp_path / "again.glb").product()
+    assert len(opened_path(tmp_path / "again.glb").json["nodes"]) == 601  # with its end site
+
+
+def test_a_bvh_computes_angles_of_many_nodes_at_once(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = count_calls(monkeypatch, euler, "unwrap")
+    (tmp_path / "in.glb").write_bytes(many.side_moving(500))
+    call("to-euler", tmp_path / "in.glb", tmp_path / "out.bvh", "--clip", "#0").product()
+    assert 0 < len(counted) < 5

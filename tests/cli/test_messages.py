@@ -121,7 +121,7 @@ def test_a_wrong_command_line_is_2_and_says_what_to_type(line: list[str], words:
     ("options", "words", "hint"),
     [
         (["--clip", "wlak"], "no clip matches 'wlak'", "did you mean 'walk'?"),
-        (["--clip", "WALK"], "no clip matches 'WALK'", "did you mean 'walk'?"),
+        (["--clip", "WALK"], "no clip matches 'WALK'", "case differ: did you mean 'walk'?"),
         (["--clip", "zzz*"], "no clip matches 'zzz*'", "the clips are 'walk', 'wave', 'jump'"),
         (["--node", "left_fot"], "no node matches 'left_fot'", "did you mean 'left_foot'?"),
         (["--node", "zzz*"], "no node matches 'zzz*'", "the nodes are 'hips'"),

@@ -52,6 +52,7 @@ WARNED = (  # command line, words of the warning, options that ask for the repor
     (("to-euler", "late.glb", "out.bvh", "--clip", "walk"), "a BVH begins there, at 0", ()),
     (("bake", "tube.glb", "out.npz", "--clip", "twist180"), "linear interpolation between frames: error of ", ()),
     (("convert-cache", "arm.glb", "out.npz"), "clip 'twist', one of 2", ()),
+    (("bake", "tube.glb", "tube.ply", "--clip", "twist180", "--fps", "2"), "frame of before still there", ()),
 )
 
 
@@ -74,6 +75,8 @@ def test_warnings(line: tuple[str, ...], words: str, report: tuple[str, ...], fo
         call("optimize", "arm.glb", "small.glb", "--max-error", "1%", "--effort", "fast").product()
     if "late.glb" in line:
         call("trim", "biped.glb", "late.glb", "--from", "0.5", "--clip", "walk").product()
+    if "tube.ply" in line:
+        call("bake", "tube.glb", "tube.ply", "--clip", "twist180", "--fps", "3").product()
     run = call(*line, "-q")
     assert run.code == 0, run.err
     said = [each for each in run.err.splitlines() if words in each]

@@ -37,6 +37,12 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
     return LAYOUTS[writing.layout](cache, outputs, writing)
 
 
+def check_frames(frames: int, vertices: int, writing: WriteOptions) -> None:
+    """Raise UnsupportedError for more frames than the layout can write; flip-books are streamed."""
+    if writing.layout == "morph":
+        gltf_morph.check_frames(frames, vertices)
+
+
 def write_with_buffers(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a .gltf in the layout `writing.layout`, and its buffers beside it, named after it ("walk.gltf.bin").
 

@@ -30,6 +30,7 @@ from anim.units import plural
 
 DEFAULT_ERROR_PER_DIAGONAL = 1e-3  # fraction of the diagonal, without a given limit
 POSITION_BYTES = 36  # of a vertex in a frame: float32, in memory three times
+PRODUCT_BYTES = 8  # of each pair of frames, of which the shapes are computed (`pca.fit_basis`)
 PORTABLE_TARGETS = 8  # guaranteed by glTF; most engines support more
 BATCH_FRAMES = 16  # frames compared at a time
 LIMIT_FRACTIONS = 0.98, 0.5  # fractions of the limit, reserve for rounding to float32; the second if the first fails
@@ -41,12 +42,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
 
     Raises UnsupportedError for more frames than the limit of memory allows, RangeError if no encoding is within.
     """
-    MemoryBudget(0).check(
-        POSITION_BYTES * cache.frame_count * cache.vertex_count,
-        f"morph targets need all frames in memory: {cache.frame_count} of {cache.vertex_count} vertices",
-        help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed), or "
-        "raise `memory_limit`",
-    )
+    check_frames(cache.frame_count, cache.vertex_count)
     whole = cache.load_all()
     limit = (
         writing.max_error if writing.max_error is not None else DEFAULT_ERROR_PER_DIAGONAL * statistics.diagonal(cache)
@@ -72,6 +68,16 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
         )
         write_document(document, outputs)
     return WriteResult(worst, _notes(form, cache.frame_count))
+
+
+def check_frames(frames: int, vertices: int) -> None:
+    """Raise UnsupportedError for more frames of so many vertices than memory allows, before any is computed."""
+    MemoryBudget(0).check(
+        max(POSITION_BYTES * frames * vertices, PRODUCT_BYTES * frames**2),
+        f"morph targets need all frames in memory: {frames} of {plural(vertices, 'vertex', 'vertices')}",
+        help="choose fewer with `fps`, or `layout` flip-visibility, or write .usdc, .npz, .pc2 or .mdd (streamed), or "
+        "raise `memory_limit`",
+    )
 
 
 def _smallest_encoding(

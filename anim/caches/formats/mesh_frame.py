@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Ints
+from anim.caches.formats import obj_reader
 from anim.caches.formats.mesh_materials import MeshMaterials
+from anim.caches.formats.mesh_text import number_fault
 from anim.errors import FormatError
 
 OBJ_DIGITS = 9  # decimals
@@ -81,13 +83,15 @@ def _corner(word: str) -> str:
 
 def read(data: bytes, ending: str) -> MeshFrame:
     """Parse a file, polygons triangulated. Raises FormatError for an invalid one."""
-    positions, faces, normals = _read_obj(data) if ending == ".obj" else _read_by_trimesh(data, ending)
+    positions, faces, normals = obj_reader.read(data) if ending == ".obj" else _read_by_trimesh(data, ending)
     if not len(positions):
         raise FormatError("has no vertices")
     if not np.isfinite(positions).all():
         raise FormatError("holds NaN or infinity")
-    if faces.size and (faces.min() < 0 or faces.max() >= len(positions)):
-        raise FormatError(f"a face uses vertex {faces.max()} of {len(positions)}")
+    outside = faces[(faces < 0) | (faces >= len(positions))]
+    if outside.size:
+        counted = f"a face uses vertex {outside[0]} of {len(positions)} (counted from 0)"
+        raise FormatError(number_fault(data, ending) or counted)
     return MeshFrame(positions.astype(np.float32), faces, normals, comment_of(data))
 
 
@@ -116,15 +120,17 @@ def _read_by_trimesh(data: bytes, ending: str) -> tuple[AnyArray, Ints, AnyArray
             found = ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
         else:
             found = _read_stl(data)
-        positions = np.asarray(found.get("vertices", np.empty((0, 3)))).reshape(-1, 3)
+        positions = np.asarray(found.get("vertices", np.empty((0, 3))), np.float64).reshape(-1, 3)
         faces = found.get("faces")
         triangles: Ints = (
             np.empty((0, 3), np.int64) if faces is None else np.asarray(triangulate_quads(faces), np.int64)
         )
-    except Exception as error:  # trimesh raises exceptions of any type
-        raise FormatError(f"is no {ending} that can be read ({' '.join(str(error).split())[:120]})") from None
-    normals = found.get("vertex_normals")
-    return positions, triangles.reshape(-1, 3), None if normals is None else np.asarray(normals, np.float32)
+        normals = found.get("vertex_normals")
+        normals = None if normals is None else np.asarray(normals, np.float32)
+    except Exception:  # trimesh raises exceptions of any type
+        damaged = f"is no {ending} that can be read: damaged, or not as its beginning says"
+        raise FormatError(number_fault(data, ending) or damaged) from None
+    return positions, triangles.reshape(-1, 3), normals
 
 
 def _read_stl(data: bytes) -> dict[str, Any]:
@@ -134,41 +140,3 @@ def _read_stl(data: bytes) -> dict[str, Any]:
         return stl.load_stl_binary(io.BytesIO(data))
     except stl.HeaderError:  # text, or damaged; trimesh guesses its encoding by a package that may not be there
         return stl.load_stl_ascii(io.BytesIO(data.decode("latin-1").encode()))
-
-
-def _read_obj(data: bytes) -> tuple[AnyArray, Ints, AnyArray | None]:
-    """Vertices of an OBJ in the order of its lines, which trimesh changes for files with normals."""
-    rows: dict[bytes, list[list[float]]] = {b"v": [], b"vn": []}
-    faces: list[list[int]] = []
-    same_normals = True
-    try:
-        for line in data.splitlines():
-            words = line.split()
-            if words and words[0] in rows:
-                rows[words[0]].append(_three_numbers(words))
-            elif words and words[0] == b"f":
-                corners = [word.split(b"/") for word in words[1:]]
-                numbers = [_index(corner[0], len(rows[b"v"])) for corner in corners]
-                same_normals &= all(len(corner) == 3 and corner[0] == corner[2] for corner in corners)
-                faces += [[numbers[0], numbers[i], numbers[i + 1]] for i in range(1, len(numbers) - 1)]
-        positions = np.array(rows[b"v"], np.float64).reshape(-1, 3)
-        triangles: Ints = np.array(faces, np.int64).reshape(-1, 3)
-    except (ValueError, IndexError, OverflowError) as error:
-        raise FormatError(f"is no .obj that can be read ({str(error)[:80]})") from None
-    has_normals = same_normals and len(rows[b"vn"]) == len(rows[b"v"]) > 0
-    normals = np.array(rows[b"vn"], np.float32).reshape(-1, 3) if has_normals else None
-    return positions, triangles, normals
-
-
-def _three_numbers(words: list[bytes]) -> list[float]:
-    """Numbers of a line "v x y z", which may have more. Raises ValueError for fewer."""
-    found = [float(word) for word in words[1:4]]
-    if len(found) != 3:
-        raise ValueError(f"{len(found)} numbers after {words[0].decode()}")
-    return found
-
-
-def _index(word: bytes, count: int) -> int:
-    """Index of a vertex from its 1-based number, or from a negative one, counted from the end."""
-    number = int(word)
-    return number - 1 if number > 0 else count + number

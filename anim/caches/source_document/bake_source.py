@@ -8,7 +8,7 @@ from typing import NamedTuple
 from anim.errors import RangeError
 from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.io.source import Source
-from anim.gltf.reading.reader import depth_first
+from anim.gltf.reading.scene_nodes import depth_first
 from anim.model import MeshPart, VertexCache
 
 BAKED_SUFFIX = " (baked)"  # of the names of new nodes

@@ -9,12 +9,12 @@ offset, scale} · normal {the same} or null · mesh · uv_set: n of its TEXCOORD
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from anim.caches.vat.members import Members
 from anim.caches.vat.presets import PRESETS, Preset
 from anim.errors import FormatError
 
@@ -22,6 +22,9 @@ SCHEMA = 1
 KIND = "vertex animation texture"
 NOT_METADATA = "not vertex-animation-texture metadata"
 FORMATS = ("float", "half", "unorm16")
+ENCODINGS = ("absolute", "offset")
+UP_AXES = ("y", "z")
+ORIGIN = "top left"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +62,7 @@ def text(about: VatMetadata, engine: Preset) -> bytes:
         "kind": KIND,
         "preset": about.preset,
         "engine": {
-            "axes": " ".join("xyz"[axis] for axis in engine.axes),
+            "axes": _axes(engine),
             "signs": list(engine.signs),
             "units_per_meter": engine.per_meter,
             "advice": list(engine.advice),
@@ -71,7 +74,7 @@ def text(about: VatMetadata, engine: Preset) -> bytes:
         "width": about.width,
         "height": about.rows * len(times),
         "rows_per_frame": about.rows,
-        "origin": "top left",
+        "origin": ORIGIN,
         "position": {
             "file": about.position,
             "format": about.format,
@@ -89,38 +92,86 @@ def text(about: VatMetadata, engine: Preset) -> bytes:
 
 
 def parse(data: bytes) -> VatMetadata:
-    """Parse a JSON. Raises FormatError for foreign or incomplete metadata."""
+    """Parse a JSON. Raises FormatError, which names the member, for foreign, incomplete or contradictory metadata."""
     try:
         content = json.loads(data)
-        if not isinstance(content, dict) or content.get("kind") != KIND or content["preset"] not in PRESETS:
-            raise FormatError(NOT_METADATA)
-        position, normal = content["position"], content["normal"]
-        found = VatMetadata(
-            content["preset"],
-            str(position["file"]),
-            None if normal is None else str(normal["file"]),
-            str(content["mesh"]),
-            str(position["format"]),
-            int(content["width"]),
-            int(content["rows_per_frame"]),
-            str(position["encoding"]),
-            tuple(float(value) for value in position["offset"]),
-            tuple(float(value) for value in position["scale"]),
-            int(content["vertices"]),
-            tuple(float(value) for value in content["times_s"]),
-            str(content["up"]),
-            int(content.get("uv_set", 1)),
-        )
-        frames, height = len(found.times), found.rows * len(found.times)
-        counts_fit = (content.get("frames", frames), content.get("height", height)) == (frames, height)
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        raise FormatError(NOT_METADATA) from None
-    shapes_fit = len(found.offset) == len(found.scale) == 3 and found.format in FORMATS and found.times
-    if not all(map(math.isfinite, (*found.offset, *found.scale, *found.times))):
-        raise FormatError("JSON holds NaN or infinity")
-    if not (shapes_fit and counts_fit) or found.rows < 1 or not 0 < found.vertices <= found.width * found.rows:
-        raise FormatError("JSON contradicts itself")
+    except (ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict) or content.get("kind") != KIND:
+        raise FormatError(NOT_METADATA)
+    members = Members(content)
+    _check_fixed(members)
+    position = members.child("position")
+    encoding = position.text("format", FORMATS)
+    found = VatMetadata(
+        members.text("preset", PRESETS),
+        position.text("file"),
+        _normal_file(members, encoding),
+        members.text("mesh"),
+        encoding,
+        members.count("width", 1),
+        members.count("rows_per_frame", 1),
+        position.text("encoding", ENCODINGS),
+        position.numbers("offset", 3),
+        position.numbers("scale", 3),
+        members.count("vertices", 1),
+        members.numbers("times_s"),
+        members.text("up", UP_AXES),
+        members.count("uv_set", 0, default=1),
+    )
+    _check_engine(members, found.preset)
+    _check_counts(members, found)
     return found
+
+
+def _check_fixed(members: Members) -> None:
+    """Raise FormatError for members of this schema that readers of the pixels rely on."""
+    if members.count("schema", 1, default=SCHEMA) != SCHEMA:
+        raise FormatError(f"schema is {members.count('schema', 1)} (expected {SCHEMA})")
+    members.text("origin", [ORIGIN], default=ORIGIN)
+    members.text("uv_v", ("top", "bottom"), default="top")
+    if members.is_set("fps"):
+        members.number("fps")
+
+
+def _check_engine(members: Members, preset: str) -> None:
+    """Raise FormatError for axes and units other than those of the preset, by which pixels are read."""
+    if not members.is_set("engine"):
+        return
+    engine, expected = members.child("engine"), PRESETS[preset]
+    engine.text("axes", [_axes(expected)])
+    for key, found, wanted in (
+        ("signs", engine.numbers("signs", 3), expected.signs),
+        ("units_per_meter", engine.number("units_per_meter"), expected.per_meter),
+    ):
+        if found != wanted:
+            raise FormatError(f"engine.{key} is {found} (expected {wanted}, as preset {preset} has)")
+
+
+def _axes(engine: Preset) -> str:
+    """Axes of glTF that are those of an engine: "x z y"."""
+    return " ".join("xyz"[axis] for axis in engine.axes)
+
+
+def _normal_file(members: Members, encoding: str) -> str | None:
+    """File of the normals, which are encoded as positions are."""
+    if not members.is_set("normal"):
+        return None
+    normal = members.child("normal")
+    normal.text("format", [encoding], default=encoding)
+    return normal.text("file")
+
+
+def _check_counts(members: Members, found: VatMetadata) -> None:
+    """Raise FormatError for numbers of frames, pixels and vertices that contradict each other."""
+    frames = len(found.times)
+    for key, expected in (("frames", frames), ("height", found.rows * frames)):
+        if members.count(key, 1, default=expected) != expected:
+            raise FormatError(f"{key} is {members.count(key, 1)} (expected {expected}, by times_s and rows_per_frame)")
+    if found.vertices > found.width * found.rows:
+        raise FormatError(
+            f"vertices is {found.vertices} (expected {found.width * found.rows} or fewer, by width and rows_per_frame)"
+        )
 
 
 def _plain() -> dict[str, list[float]]:

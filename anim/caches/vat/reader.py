@@ -24,8 +24,11 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     name = f"{inputs.main}.json"
     if name not in inputs.names():
         raise FormatError(f"'{name}' is not beside it, and only that says what the pixels mean")
-    with read_all(inputs, name) as data:
-        about = metadata.parse(data)
+    try:
+        with read_all(inputs, name) as data:
+            about = metadata.parse(data)
+    except FormatError as error:
+        raise error.at(f"'{name}'", ": ") from None
     engine = presets.PRESETS[about.preset]
     rest, faces = _mesh(inputs, about)
     packed = PixelEncoding(about.format, np.array(about.offset), np.array(about.scale))

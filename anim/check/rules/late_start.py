@@ -24,11 +24,11 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips; for Unity also those with only some late tracks."""
     for report, clip in file.clips:
         if report.start_s > MIN_LATE_START_S:
-            yield file.in_clip(report.index, value=report.start_s, time_s=0.0)
+            yield file.in_clip(report.index, value=report.start_s, time_s=report.start_s)
         elif parameters.target == UNITY:
             late = [float(track.times[0]) for track in clip.tracks if track.times[0] > MIN_LATE_START_S]
             if late:
-                found = file.in_clip(report.index, len(late), max(late), problem=LATE_TRACKS, time_s=0.0)
+                found = file.in_clip(report.index, len(late), max(late), problem=LATE_TRACKS, time_s=max(late))
                 yield replace(found, advice=ADD_KEYS)
 
 

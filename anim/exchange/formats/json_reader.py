@@ -90,7 +90,7 @@ def read(data: bytes, options: PartialConvention) -> EulerMotion:
 
     options: the convention of the command line. Raises FormatError with the position.
     """
-    content = json_text.parse(data)
+    content = json_text.parse(json_text.skip_mark(data))
     if "asset" in content and "schema" not in content:
         raise FormatError(f"is a glTF already (expected a JSON of curves, schema '{SCHEMA}')")
     if content.get("schema") != SCHEMA:

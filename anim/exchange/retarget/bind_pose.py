@@ -62,14 +62,12 @@ def _bind_matrices(
     skeleton: Skeleton, world: Floats, held: tuple[int, Skin], known: dict[int, Floats]
 ) -> dict[int, Floats]:
     """World bind matrices (3, 4) by joint of a skin."""
-    last = {node: j for j, node in enumerate(held[1].joints.tolist())}  # glTF forbids to repeat a joint
-    named = list(last.values())
-    joints, inverse = held[1].joints[named], held[1].inverse_bind[named]
+    joints, inverse = held[1].joints, held[1].inverse_bind
     in_mesh = matrix.inverse(inverse)
     moves = matrix.multiply(world[joints], inverse)
     volumes = np.abs(np.linalg.det(moves[:, :, :3]))
     usual = float(np.median(volumes))
-    sound = np.flatnonzero(np.abs(volumes - usual) <= 3 * SCALE_TOLERANCE * usual)
+    sound = _last_of_each(joints, np.flatnonzero(np.abs(volumes - usual) <= 3 * SCALE_TOLERANCE * usual))
     if not usual > 0 or not len(sound):
         return {}
     shared = [j for j in sound.tolist() if int(joints[j]) in known]
@@ -78,6 +76,12 @@ def _bind_matrices(
     else:
         placed = _world_from_mesh(skeleton, world, held[0], joints[sound], in_mesh[sound], usual)
     return {int(joints[j]): matrix.multiply(placed, in_mesh[j]) for j in sound.tolist()}
+
+
+def _last_of_each(joints: Ints, chosen: Ints) -> Ints:
+    """The chosen indices without those of a joint that a later one has too, which glTF forbids."""
+    last = dict(zip(joints[chosen].tolist(), chosen.tolist(), strict=True))
+    return np.array(list(last.values()), np.int64)
 
 
 def _world_from_mesh(

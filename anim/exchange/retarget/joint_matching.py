@@ -148,8 +148,8 @@ def read_aliases(data: bytes) -> dict[str, str]:
     An empty target omits the joint; in CSV, lines that begin with # are comments. Raises FormatError with the line.
     b"LeftArm,upperarm.l\\nLFingers,\\n" → {"LeftArm": "upperarm.l", "LFingers": ""}
     """
-    if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{":
-        content = json_text.parse(data)
+    if json_text.skip_mark(data).lstrip()[:1] == b"{":
+        content = json_text.parse(json_text.skip_mark(data))
         for name, other in content.items():
             if not isinstance(other, str):
                 raise FormatError(f"'{name}' has {other!r} (expected the name of a node)")

@@ -11,7 +11,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints, unique_sorted
 from anim.curves.fitting.adaptive_keys import refine, rotation_segment_count, sample_times, vector_segment_count
-from anim.errors import NotFoundError, RangeError
+from anim.errors import NotFoundError, UnsupportedError
 from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.retarget.ground_contact import find_soles, ground_offset, has_feet, with_descendants
 from anim.exchange.retarget.joint_matching import JointMatch
@@ -94,13 +94,14 @@ def retarget(
     floor: CONTACT moves the hips vertically so that the soles keep their rest height while a foot of the source is
     down; KEEP only scales heights, and so does CONTACT without a matched foot.
     bind_time: s, time of the source's rest pose; None for the pose with all angles zero.
-    Raises NotFoundError without a matched joint, RangeError for CONTACT in a motion of over a day.
+    Raises NotFoundError without a matched joint, UnsupportedError for CONTACT in a motion of over a day.
     """
     if not matching.pairs:
         raise NotFoundError("no joint of the motion is one of the character", help="pair them in an `alias` file")
     if floor == GroundMode.CONTACT and source.clip.end - source.clip.start > MAX_CONTACT_DURATION_S:
         seconds = source.clip.end - source.clip.start
-        raise RangeError(f"the motion lasts {seconds:g} s: too long to find foot contacts", help="choose `floor` keep")
+        problem = f"the motion lasts {seconds:g} s: too long to find foot contacts"
+        raise UnsupportedError(problem, help="choose `floor` keep")
     follow = build_transfer(source.skeleton, source.clip, target.skeleton, matching, bind_time=bind_time)
     size = float(np.ptp(follow.target_rest.positions, axis=0).max()) or 1.0
     knots, before = _times(source.clip)

@@ -52,6 +52,7 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
         raise FormatError("is a Git LFS pointer, not the file itself", help="git lfs pull")
     if not len(content):
         raise FormatError("is empty (expected glTF)")
+    json_text.check_mark(head)
     if head.lstrip()[:1] != b"{":
         raise FormatError(f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)")
     raw = content.tobytes()
@@ -197,6 +198,7 @@ def _chunks(data: Bytes) -> list[tuple[int, Bytes]]:
 
 def _parse(raw: bytes) -> tuple[Json, tuple[int, ...]]:
     """The JSON, and the indices of animated nodes that had a matrix in it."""
+    json_text.check_mark(raw)
     parsed = json_text.parse(raw)
     schema.validate(parsed)
     return expand_matrices(parsed)

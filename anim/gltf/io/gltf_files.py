@@ -16,7 +16,8 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from anim.errors import OutputError
-from anim.files import atomic, resolver, signals
+from anim.files import atomic, before_commit, resolver, signals, special_files
+from anim.files.folder_lock import lock_folder
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container, unused_buffers
 
@@ -41,9 +42,9 @@ def write(
     to the link's target folder.
     """
     named, path = path, resolver.resolve_links(path)
-    if path.exists() and not path.is_file():
+    if special_files.is_special(named):
         raise OutputError(f"{named}: is no plain file (a .gltf needs a folder for its buffers)", help="write a .glb")
-    with nullcontext() if dry_run else atomic.lock_folder(path.parent):
+    with nullcontext() if dry_run else lock_folder(path.parent):
         names = _Names(path.parent, unused_buffers.external_buffers(path))
         files = container.gltf(document, path.stem, keep_external=same_folder, choose=names.choose)
         made = files.pop(f"{path.stem}.gltf")
@@ -103,6 +104,7 @@ def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> N
         waiting = {place: atomic.write_temporary(place, pieces, made) for place, pieces in new.items()}
         is_there = atomic.has_bytes(path, text)
         main = None if is_there else atomic.write_temporary(path, text, made)
+        before_commit.run_job()
         with signals.hold_signals(), atomic.temporary_files() as placed:
             for place, temporary in waiting.items():
                 atomic.move_to_free(temporary, place)

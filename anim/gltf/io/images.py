@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from anim.errors import FormatError, OutputError
-from anim.files import atomic, resolver
+from anim.files import atomic, before_commit, resolver
 from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
 
@@ -34,6 +34,8 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
 
 def write_copies(copies: Mapping[Path, Bytes]) -> None:
     """Write images to free names; an existing file there has the same bytes. Raises OutputError."""
+    if copies:
+        before_commit.run_job()
     for path, data in copies.items():
         with atomic.name_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)

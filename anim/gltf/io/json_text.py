@@ -11,6 +11,20 @@ from typing import NoReturn
 from anim.errors import FormatError
 from anim.gltf.document import Json
 
+MARK = b"\xef\xbb\xbf"  # byte order mark of UTF-8, with which some editors begin text
+
+
+def skip_mark(raw: bytes) -> bytes:
+    """Return text without a byte order mark. Readers of JSON may accept one (RFC 8259), those of glTF must not."""
+    return raw.removeprefix(MARK)
+
+
+def check_mark(raw: bytes) -> None:
+    """Raise FormatError for text with a byte order mark, also one of UTF-16."""
+    if raw.startswith((MARK, b"\xff\xfe", b"\xfe\xff")):
+        problem = "starts with a byte order mark (expected UTF-8 without one, as glTF requires)"
+        raise FormatError(problem, help="save it as UTF-8 without BOM")
+
 
 def parse(raw: bytes) -> Json:
     """Return the JSON object in `raw`, keys in its order.
@@ -22,8 +36,7 @@ def parse(raw: bytes) -> Json:
     except UnicodeDecodeError as error:
         raise FormatError(f"JSON is not UTF-8 (byte {error.start})") from None
     except json.JSONDecodeError as error:
-        hint = "starts with a byte order mark" if raw[:3] == b"\xef\xbb\xbf" else error.msg.lower()
-        raise FormatError(f"JSON is broken at line {error.lineno}, column {error.colno}: {hint}") from None
+        raise FormatError(f"JSON is broken at line {error.lineno}, column {error.colno}: {error.msg.lower()}") from None
     except RecursionError:
         raise FormatError("JSON is nested too deep") from None
     except ValueError as error:  # for example a number of thousands of digits

@@ -31,7 +31,7 @@ def read_broken(data: Bytes, resolve: Resolve | None, refusal: AnimError) -> Bro
 
     try:
         raw, binary = _chunks(data)
-        parsed = json_text.parse(raw)
+        parsed = json_text.parse(json_text.skip_mark(raw))
     except FormatError:
         raise refusal from None
     found = salvage.salvage(parsed)

@@ -8,15 +8,15 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError, FormatError, ShapeError, UnsupportedError
-from anim.gltf.document import Document, Json, json_array, node_label
+from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.meshes import BYTES_PER_POSED_VERTEX, Meshes
+from anim.gltf.reading.scene_nodes import check_not_required, depth_first
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, MorphedNode, Scene, Skeleton, Skin
 
 MAX_LISTED_CLIPS = 3  # clips in a message
-INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 def skeleton(document: Document) -> Skeleton:
@@ -104,7 +104,7 @@ def scene(
     skeleton: the document's, if the caller has it. normals, tangents: read those of vertices and morph targets too.
     repeats: store vertices again for the last primitives of a mesh that only repeat earlier ones (`Mesh.repeats`):
     measures, for which those move alike, leave that out.
-    A mesh with EXT_mesh_gpu_instancing is included once, on its node (`instanced_nodes`).
+    A mesh with EXT_mesh_gpu_instancing is included once, on its node (`scene_nodes.instanced_nodes`).
     Raises UnsupportedError if vertices cannot be read: Draco without the package DracoPy, an unknown compression,
     EXT_mesh_gpu_instancing where the file requires it.
     """
@@ -135,48 +135,6 @@ def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
     return tuple(
         (i, found[node["skin"]]) for i, node in enumerate(json_array(document.json, "nodes")) if "skin" in node
     )
-
-
-def depth_first(json: Json, parents: Sequence[int] | None = None) -> Iterator[int]:
-    """Yield node indices depth-first: from the scenes' roots, each once, then from other roots.
-
-    parents: (N,) of each node, −1 for roots, if the caller has them.
-    """
-    nodes = json_array(json, "nodes")
-    parents = hierarchy.parents(json) if parents is None else parents
-    roots = [root for scene in json_array(json, "scenes") for root in scene.get("nodes", ())]
-    roots += [i for i, parent in enumerate(parents) if parent < 0]
-    seen: set[int] = set()
-    stack = list(reversed(roots))
-    while stack:
-        node = stack.pop()
-        if node in seen:
-            continue
-        seen.add(node)
-        yield node
-        stack.extend(reversed(nodes[node].get("children", ())))
-
-
-def mesh_nodes_of_other_scenes(document: Document) -> list[int]:
-    """Return the nodes with a mesh outside the default scene: `scene`, else the first; [] without scenes."""
-    nodes, scenes = json_array(document.json, "nodes"), json_array(document.json, "scenes")
-    if not scenes:
-        return []
-    shown: set[int] = set()
-    stack = list(scenes[document.json.get("scene", 0)].get("nodes", ()))
-    while stack:
-        node = stack.pop()
-        shown.add(node)
-        stack.extend(nodes[node].get("children", ()))
-    return [i for i, node in enumerate(nodes) if "mesh" in node and i not in shown]
-
-
-def is_default_scene_empty(document: Document) -> bool:
-    """Return whether no mesh is in the default scene; False without scenes."""
-    if not json_array(document.json, "scenes"):
-        return False
-    meshes = sum("mesh" in node for node in json_array(document.json, "nodes"))
-    return len(mesh_nodes_of_other_scenes(document)) == meshes
 
 
 def clip_label(name: str, number: int, what: str = "clip") -> str:
@@ -282,21 +240,3 @@ def _unit(rotation: list[float], node: int) -> Floats:
     if length == 0:
         raise FormatError("rotation is zero (expected a unit quaternion)", where=f"nodes[{node}]")
     return q / length
-
-
-def instanced_nodes(json: Json) -> list[int]:
-    """Return the indices of the nodes with mesh instances."""
-    nodes = enumerate(json_array(json, "nodes"))
-    return [i for i, node in nodes if "mesh" in node and INSTANCING in node.get("extensions", {})]
-
-
-def check_not_required(document: Document) -> None:
-    """Raise UnsupportedError if the file requires mesh instancing.
-
-    An error bound of one instance does not hold for the others.
-    """
-    json = document.json
-    if INSTANCING in json.get("extensionsRequired", ()) and (found := instanced_nodes(json)):
-        raise UnsupportedError(
-            f"{node_label(json, found[0])} has copies of its mesh by {INSTANCING}, which is required and not read here"
-        )

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints, unique_sorted
 from anim.model import Clip, Interpolation
 from anim.model.time_axis import merge_times
-from anim.sampling.times import check_duration, check_fps, frame_times
+from anim.sampling.times import FEWER_FRAMES, SHORTER_CLIP, check_duration, check_fps, frame_times
 
 SAME_MOMENT = 1e-6  # s; closer times are equal, written as float32 and as float64
 FPS = 120.0  # fps of the grid for motion between keys
@@ -44,7 +44,8 @@ def grid_times(*clips: Clip, fps: float = FPS, start: float = 0.0) -> Floats:
     Of long clips with few keys only some pairs of neighboring frames between two keys, so that the number of times is
     linear in keys, and speeds are still measured from frame to frame.
     """
-    frames = frame_times(start, max((clip.end for clip in clips), default=0.0), fps=fps)
+    advice = SHORTER_CLIP if fps == FPS else FEWER_FRAMES  # most commands have no option for this rate
+    frames = frame_times(start, max((clip.end for clip in clips), default=0.0), fps=fps, help=advice)
     if len(frames) <= MAX_SPARSE_TIMES:
         return frames
     first = np.searchsorted(frames, _key_times(clips))
@@ -62,10 +63,10 @@ def cut_times(*clips: Clip, parts: int, step: float) -> Floats:
 
     In seconds, increasing. Each interval between neighboring keys is divided into equal parts. parts: minimum number of
     parts of an interval, 1 … 32. step: s, maximum duration of a part, but for long clips with few keys; > 0.
-    Raises DataRangeError for the clips that `dense_times` refuses.
+    Raises UnsupportedError for the clips that `dense_times` refuses.
     """
     keys = _key_times(clips)
-    check_duration(0.0, float(keys[-1]), fps=FPS)
+    check_duration(0.0, float(keys[-1]), fps=FPS, help=SHORTER_CLIP)
     gaps = np.diff(keys)
     counts = np.maximum(np.ceil(gaps / step).astype(np.int64), parts)
     if counts.sum() > MAX_SPARSE_TIMES:

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hierarchy
-from anim.measure.error.point_matrix import PointMatrix, stack_blocks
+from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Pose, Skeleton
 from anim.sampling.world import world_by_node
@@ -86,14 +86,9 @@ def _squares_of_part(skin: SkinMotion, ends: Sequence[Pose], changed: _Changed) 
     points = _points_below(skin.vertices, below, index)
     if not len(points):
         return np.zeros(len(changed.node))
-    rows = points.rows()
-
-    def squares(differences: Differences) -> Floats:
-        return rows.squares(stack_blocks(differences, points.nodes))
-
     part = [Pose(each.times, *(getattr(each, name)[:, kept] for name in PARTS)) for each in ends]
     own = _Changed(changed.clip, index[changed.node], np.where(changed.root == changed.node, index[changed.node], -1))
-    return _squares(_take(skin.skeleton, kept, index), part, own, squares, len(changed.node))
+    return _squares(_take(skin.skeleton, kept, index), part, own, points.squares, len(changed.node))
 
 
 def _subtrees(skeleton: Skeleton, nodes: Ints) -> tuple[Bools, Bools]:

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.measure.error import orientation_probes, point_matrix
-from anim.measure.error.point_matrix import PointMatrix, PointRows
+from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.surface import Surface, has_vertices, morph_points, skin_points, surfaces
 from anim.measure.loops import clip_ends
 from anim.measure.loops.clip_ends import EndPoses, LoopRange
@@ -75,10 +75,6 @@ class SkinMotion:
         """All distinct points."""
         return self._all[0]
 
-    @cached_property
-    def _rows(self) -> PointRows:
-        return self.vertices.rows()
-
     @property
     def owners(self) -> Ints:
         """The node of each point's mesh (P,)."""
@@ -118,7 +114,7 @@ class SkinMotion:
 
         differences: gives those of world matrices (J, F, 3, 4) of nodes (J,).
         """
-        return self._rows.squares(point_matrix.stack_blocks(differences, self.vertices.nodes))
+        return self.vertices.squares(differences)
 
     def posed_at_once(self, times: int) -> int:
         """Return the number of clips, or frames, at so many times each, of which all matrices are computed at once."""

@@ -12,7 +12,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.point_matrix import PointMatrix, stack_points
+from anim.measure.error.point_matrix import PointMatrix
+from anim.measure.error.point_rows import stack_points
 from anim.model import Skeleton
 from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion

@@ -10,8 +10,10 @@ from anim.arrays import Floats
 from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import RangeError
 from anim.sampling import frame_times
+from anim.sampling.times import too_many_frames
 
 MAX_FRAMES = 3000
+FEWER_PICTURES = "choose a lower `fps`, or `count` instead, or a part by `begin` and `end`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +48,15 @@ class FrameSelection:
     def times(self, start: float, end: float) -> Floats:
         """Return times (F,) s of a motion from `start` to `end`; of those in `at` only those within.
 
-        Raises RangeError if the selection is empty otherwise, or exceeds the greatest number of frames.
+        Raises RangeError if the selection is empty otherwise, UnsupportedError for more than MAX_FRAMES frames.
         """
         if self.at:
             at = np.unique(np.array(self.at, np.float64))
             return at[(at >= start - SAME_FRAME_TOLERANCE_S) & (at <= end + SAME_FRAME_TOLERANCE_S)]
         first, last = self.span(start, end)
         if self.fps is not None and self.count is None:
-            found = frame_times(first, last, fps=self.fps)
+            found = frame_times(first, last, fps=self.fps, help=FEWER_PICTURES)
             if len(found) > MAX_FRAMES:
-                raise RangeError(f"{len(found)} frames are too many for a picture (limit {MAX_FRAMES})")
+                raise too_many_frames(len(found), self.fps, limit=MAX_FRAMES, help=FEWER_PICTURES)
             return found
         return np.linspace(first, last, self.count or 1) if last > first else np.array([first])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import NotFoundError, RangeError
+from anim.errors import NotFoundError, RangeError, UnsupportedError
 from anim.model import Clip, Interpolation, Scene
 from anim.model.skeleton import ancestors
 from anim.simulation.particles.node_motion import NodeMotion
@@ -78,13 +78,14 @@ def emit(
     """Return the particles born from `start` until before `end` s.
 
     The clip is evaluated at each birth; clip_start: its time at 0 s, before which it has the pose of 0 s.
-    Raises NotFoundError for a node without a mesh where particles leave a surface, RangeError for over a million.
+    Raises NotFoundError for a node without a mesh where particles leave a surface, UnsupportedError for over a million.
     """
     first = start if emitter.start is None else max(start, emitter.start)
     last = end if emitter.end is None else min(end, emitter.end)
     count = emitter.burst + int(np.ceil(max(last - first, 0) * emitter.rate - 1e-9))
     if count * len(emitter.nodes) > MAX_PARTICLES:
-        raise RangeError(f"{count * len(emitter.nodes):.6g} particles (limit {MAX_PARTICLES})")
+        problem = f"{count * len(emitter.nodes):.6g} particles (limit {MAX_PARTICLES})"
+        raise UnsupportedError(problem, help="choose a lower `rate`, or a shorter `duration`")
     times = np.concatenate(
         [np.full(emitter.burst, first), first + np.arange(count - emitter.burst) / (emitter.rate or 1)]
     )

@@ -52,7 +52,7 @@ def read_spring_file(
     Raises FormatError with the position for anything unknown or invalid, and NotFoundError for a node that the skeleton
     lacks.
     """
-    content = json_text.parse(data)
+    content = json_text.parse(json_text.skip_mark(data))
     _check(content, has_chains=has_chains)
     colliders = [
         locate(f"colliders[{i}]", _collider, each, skeleton) for i, each in enumerate(content.get("colliders", []))

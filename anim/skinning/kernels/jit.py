@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -15,6 +16,7 @@ import numba
 import anim
 
 KERNEL_FOLDERS = ("skinning/kernels", "simulation/cloth/kernels", "simulation/particles/kernels")  # in `anim`
+WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -55,11 +57,25 @@ def _has_cache() -> bool:
     folder = numba.config.CACHE_DIR
     try:
         Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = os.stat(folder)
+        return bool(folder) and os.access(folder, os.W_OK) and (os.name != "posix" or _is_private(folder))
     except OSError:
         return False
-    is_ours = os.name != "posix" or (found.st_uid == os.geteuid() and not found.st_mode & 0o022)
-    return bool(folder) and is_ours and os.access(folder, os.W_OK)
+
+
+def _is_private(folder: str) -> bool:
+    """Return whether only the user can write to a folder, and only root, too, exchange it or one above it.
+
+    As ssh's StrictModes; by the path as it is given and without links. In a folder as /tmp (sticky) names are safe.
+    """
+    user, own = os.geteuid(), os.stat(folder)
+    if own.st_uid != user or own.st_mode & WRITABLE_BY_OTHERS:
+        return False
+    paths = Path(os.path.abspath(folder)), Path(os.path.realpath(folder))
+    above = [each.stat() for each in {*paths[0].parents, *paths[1].parents}]
+    return all(
+        each.st_uid in (0, user) and (each.st_mode & stat.S_ISVTX or not each.st_mode & WRITABLE_BY_OTHERS)
+        for each in above
+    )
 
 
 def _cache_folder() -> str:

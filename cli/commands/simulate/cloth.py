@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from anim.arrays import Bools
+from anim.caches import registry
 from anim.caches.transforms import statistics, up_axis
 from anim.errors import UnstableError
 from anim.gltf.document import Document, json_array
@@ -130,7 +131,7 @@ def command(
     kind = check_report(report)
     ending = cache_files.check(output, None if format is None else f".{format}")
     given: dict[str, Any] = {"quantize": quantize, "layout": layout}
-    caches.write_options(ending, given | {"max_error": max_error})
+    writing = caches.write_options(ending, given | {"max_error": max_error})
     substeps = max(1, math.ceil(1 / (fps * parse_seconds(step, "--step")) - 1e-9))
     limit = None if max_stretch is None else units.parse_fraction(max_stretch, "--max-stretch")
     with documents.source(input, reporter) as source:
@@ -170,6 +171,7 @@ def command(
             loop,
             estimate_error=kind == "json",
         )
+        registry.check_frames(ending, options.num_frames, _num_vertices(scene, node), writing)
         pinned = _pinned(document, scene, node, cloth, pin)
         announce_compiling(reporter)
         try:
@@ -196,8 +198,7 @@ def command(
     )
     if report is not None and not dry_run:
         write_report(run.report, report)
-    for note in saved.written.notes:
-        reporter.info(f"note: {note}")
+    saved.report(reporter)
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     reporter.info(
@@ -260,6 +261,10 @@ def _mesh_node(scene: Scene, mesh: list[str] | None) -> int:
         names = ", ".join(f"'{each.mesh.name or f'#{each.node}'}'" for each in scene.instances[:8])
         raise UsageError(f"{len(nodes)} meshes are chosen (expected one)", help=f"choose with --mesh: {names}")
     return nodes[0]
+
+
+def _num_vertices(scene: Scene, node: int) -> int:
+    return sum(len(each.mesh.positions) for each in scene.instances if each.node == node)
 
 
 def _pinned(document: Document, scene: Scene, node: int, cloth: list[str] | None, pin: list[str] | None) -> Bools:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -23,13 +22,34 @@ from anim.gltf.writing.append import VERTICES, append_accessors
 from anim.measure.inspect.contents import read_contents
 from anim.measure.inspect.inspect import inspect
 from anim.model import Clip, Track
+from tests.anim.check.json_faults import (
+    ARM_JOINTS,
+    FOOT,
+    Edit,
+    apart,
+    declared_pointer,
+    equal_names,
+    idle_joint,
+    joints_apart,
+    move_mesh,
+    other_root,
+    pointer_at_node,
+    put,
+    same_names,
+    scale_above,
+    second_skin,
+    strided_matrices,
+    unused_sampler,
+    with_matrix,
+    with_strides,
+    without_bounds,
+    without_joints,
+    wrong_hint,
+    wrong_type,
+)
 from tests.clips import CUBICSPLINE, about, track
 from tests.files import glb_of, opened_fixture
 
-Json = dict[str, Any]
-Edit = Callable[[Json], None]
-ARM_JOINTS: list[int] = opened_fixture("arm").json["skins"][0]["joints"]
-FOOT = ARM_JOINTS[-1]
 FRAMES = np.arange(40)
 SECOND = np.linspace(0, 1, 13)
 SMOOTH = np.sin(SECOND * 2 * np.pi)[:, None] * [0.1, 0.0, 0.0]
@@ -78,22 +98,6 @@ def with_tracks(*tracks: Track, name: str = "walk", fixture: str = "arm") -> Doc
     return writer.replace_clips(document, {0: Clip(name, tracks)})
 
 
-def put(path: str, value: Any) -> Edit:
-    """Return an edit that sets a property by its JSON pointer; None removes it."""
-
-    def edit(json: dict[str, Any]) -> None:
-        *parts, last = path.strip("/").split("/")
-        at: Any = json
-        for part in parts:
-            at = at[int(part)] if isinstance(at, list) else at.setdefault(part, {})
-        if value is None:
-            del at[last]
-        else:
-            at[int(last) if isinstance(at, list) else last] = value
-
-    return edit
-
-
 def steps(values: Sequence[float]) -> Track:
     return track("translation", np.arange(len(values)) / 10, [[value, 0, 0] for value in values], node=1)
 
@@ -109,53 +113,6 @@ def with_weights(values: list[list[float]]) -> Document:
 def spline(slope: float) -> Track:
     tangents = [[slope, 0, 0], [-slope, 0, 0]]
     return track("translation", [0, 1], [[0, 0, 0], [1, 0, 0]], CUBICSPLINE, node=1, tangents=(tangents, tangents))
-
-
-def other_root(json: dict[str, Any]) -> None:
-    """Animate a node that is in no scene."""
-    json["nodes"].append({"name": "lost"})
-    for channel in json["animations"][0]["channels"]:
-        channel["target"] = {"node": len(json["nodes"]) - 1, "path": channel["target"]["path"]}
-    json["animations"][0]["channels"] = json["animations"][0]["channels"][:1]
-
-
-def joints_apart(json: dict[str, Any]) -> None:
-    """Leave the joints out of the scene that shows their skin."""
-    for node in json["nodes"]:
-        if "skin" in node:
-            node.pop("children", None)
-    json["scenes"][0]["nodes"] = [i for i, node in enumerate(json["nodes"]) if "skin" in node]
-
-
-def same_names(json: dict[str, Any]) -> None:
-    for node in json["nodes"]:
-        node["name"] = "bone"
-
-
-def scale_above(json: dict[str, Any]) -> None:
-    joints = json["skins"][0]["joints"]
-    json["nodes"].append({"name": "Armature", "scale": [0.01, 0.01, 0.01], "children": [joints[0]]})
-    for scene in json["scenes"]:
-        scene["nodes"] = [len(json["nodes"]) - 1 if node == joints[0] else node for node in scene["nodes"]]
-
-
-def second_skin(json: dict[str, Any]) -> None:
-    json["skins"].append(json["skins"][0])
-
-
-def move_mesh(json: dict[str, Any]) -> None:
-    next(node for node in json["nodes"] if "skin" in node)["translation"] = [0.0, 1.0, 0.0]
-
-
-def pointer_at_node(json: dict[str, Any]) -> None:
-    channel = json["animations"][0]["channels"][0]
-    address = f"/nodes/{channel['target']['node']}/{channel['target']['path']}"
-    channel["target"] = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": address}}}
-
-
-def declared_pointer(json: dict[str, Any]) -> None:
-    pointer_at_node(json)
-    json["extensionsUsed"] = ["KHR_animation_pointer"]
 
 
 def swing(fault: Callable[[Floats], Floats] = lambda degrees: degrees) -> Track:
@@ -188,43 +145,6 @@ def flipped_spline() -> Track:
     return track("rotation", [0, 1], values, CUBICSPLINE, node=ARM_JOINTS[1], tangents=(zero, zero))
 
 
-def equal_names(json: Json) -> None:
-    for clip in json["animations"]:
-        clip["name"] = "walk"
-
-
-def wrong_type(json: Json) -> None:
-    json["accessors"].append({"componentType": 5126, "count": 1, "type": "VEC9"})
-
-
-def unused_sampler(json: Json) -> None:
-    json["animations"][0]["samplers"].append(dict(json["animations"][0]["samplers"][0]))
-
-
-def without_bounds(json: Json) -> None:
-    for sampler in json["animations"][0]["samplers"]:
-        for key in ("min", "max"):
-            json["accessors"][sampler["input"]].pop(key, None)
-
-
-def with_strides(json: Json) -> None:
-    sizes = {"SCALAR": 4, "VEC3": 12, "VEC4": 16}
-    for sampler in json["animations"][0]["samplers"]:
-        output = json["accessors"][sampler["output"]]
-        json["bufferViews"][output["bufferView"]]["byteStride"] = sizes[output["type"]]
-
-
-def with_matrix(json: Json) -> None:
-    node = json["nodes"][json["animations"][0]["channels"][0]["target"]["node"]]
-    for key in ("translation", "rotation", "scale"):
-        node.pop(key, None)
-    node["matrix"] = np.eye(4).ravel().tolist()
-
-
-def without_joints(json: Json) -> None:
-    del json["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"]
-
-
 def with_hidden_positions(document: Document) -> Document:
     """Return a document with positions that only an extension nobody knows can give."""
     json = copy.deepcopy(document.json)
@@ -233,34 +153,6 @@ def with_hidden_positions(document: Document) -> Document:
     json["bufferViews"].append({"buffer": len(json["buffers"]), "byteLength": 9999, "extensions": {"ACME_packed": {}}})
     json["buffers"].append({"byteLength": 9999})
     return Document(json, (*document.buffers, Buffer(9999, None, None)))
-
-
-def apart(json: Json) -> None:
-    """Take the last joint out of the hierarchy of the others."""
-    last = json["skins"][0]["joints"][-1]
-    for node in json["nodes"]:
-        if last in node.get("children", ()):
-            node["children"].remove(last)
-            if not node["children"]:
-                del node["children"]
-    json["scenes"][0]["nodes"].append(last)
-
-
-def wrong_hint(json: Json) -> None:
-    json["skins"][0]["skeleton"] = json["skins"][0]["joints"][-1]
-
-
-def strided_matrices(json: Json) -> None:
-    accessor = json["accessors"][json["skins"][0]["inverseBindMatrices"]]
-    json["bufferViews"][accessor["bufferView"]]["byteStride"] = 64
-
-
-def idle_joint(json: Json) -> None:
-    skin = json["skins"][0]
-    json["nodes"].append({"name": "idle"})
-    json["nodes"][skin["joints"][-1]].setdefault("children", []).append(len(json["nodes"]) - 1)
-    skin["joints"].append(len(json["nodes"]) - 1)
-    del skin["inverseBindMatrices"]
 
 
 def with_influences(joints: list[list[int]], weights: list[list[float]]) -> Document:

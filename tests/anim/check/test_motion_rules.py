@@ -14,7 +14,6 @@ from anim.check.finding import Finding
 from anim.check.selection import RuleSelection
 from anim.model import Track
 from tests.anim.check.cases import (
-    ARM_JOINTS,
     FRAMES,
     checked,
     flipped_spline,
@@ -27,6 +26,7 @@ from tests.anim.check.cases import (
     tremble,
     with_tracks,
 )
+from tests.anim.check.json_faults import ARM_JOINTS
 from tests.clips import track
 from tests.files import opened_fixture
 

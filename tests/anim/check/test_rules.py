@@ -19,21 +19,8 @@ from anim.check.selection import RuleSelection
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
-from tests.anim.check.cases import (
-    ARM_JOINTS,
-    SMOOTH,
-    SOUND,
-    WRONG,
-    checked,
-    edited,
-    found,
-    joint,
-    put,
-    same_names,
-    selection,
-    steps,
-    with_tracks,
-)
+from tests.anim.check.cases import SMOOTH, SOUND, WRONG, checked, edited, found, joint, selection, steps, with_tracks
+from tests.anim.check.json_faults import ARM_JOINTS, put, same_names
 from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, track
 from tests.files import glb_of, opened_fixture
 
@@ -172,6 +159,9 @@ def test_unity_needs_keys_at_0_in_every_track() -> None:
     assert found(document, "GA105") == []
     (finding,) = found_in_unity(document, "GA105")
     assert finding.problem == "1 track has its first key at 0.5 s: Unity shows another pose until then"
+    assert finding.time_s == 0.5
+    (finding,) = found(with_tracks(late), "GA105")
+    assert (finding.problem, finding.time_s) == ("first key at 0.5 s: players hold the first pose until then", 0.5)
     fixed = fix_all(checked(document), RuleSelection(select=("GA105",), target="unity"), unsafe=False)
     assert [each.error_m for each in fixed.applied] == [0.0]
     assert found_in_unity(fixed.document, "GA105") == []

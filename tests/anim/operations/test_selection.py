@@ -101,3 +101,21 @@ def test_a_pointer_at_a_node_is_that_nodes_track() -> None:
     turn = next(each for each in reader.clips(document) if each.name == "turn")
     chosen = Selection(nodes=["turning"], paths=["rotation"]).chosen_tracks(turn, reader.skeleton(document))
     assert chosen == {0}
+
+
+@pytest.mark.parametrize(
+    ("glob", "names", "suggested"),
+    [
+        ("*FOOT", ["hips", "left_foot", "right_foot"], "'*foot'"),
+        ("hand*", ["HAND_L", "HAND_R"], "'HAND*'"),
+        ("hand*", ["Hand", "Hand2", "foot"], "'Hand*'"),
+        ("*_FOOT", ["Left_foot", "rIGHT_fOOT"], "'Left_foot' or 'rIGHT_fOOT'"),
+        ("head", ["hEAD", "heads"], "'hEAD'"),
+    ],
+)
+def test_another_case_is_suggested_so_that_it_matches(glob: str, names: list[str], suggested: str) -> None:
+    with pytest.raises(NotFoundError) as caught:
+        match_names([glob], names, "node")
+    assert caught.value.help == f"upper and lower case differ: did you mean {suggested}?"
+    for each in suggested.replace("'", "").split(" or "):
+        assert match_names([each], names, "node")

@@ -110,6 +110,30 @@ def test_code_that_others_may_have_put_there_is_not_run(
         assert not jit._has_cache.__wrapped__()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="has no such modes")
+@pytest.mark.parametrize("through", ["path", "link"])
+@pytest.mark.parametrize(
+    ("mode", "is_used"), [(0o755, True), (0o775, False), (0o757, False), (0o1777, True), (0o1775, True)]
+)
+def test_code_in_a_folder_that_others_may_exchange_is_not_run(
+    mode: int, is_used: bool, through: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder above it that others may write to, unless they may not rename in it what is not theirs (/tmp)."""
+    above = tmp_path / "above"
+    folder = above / "mine" / "code"
+    folder.mkdir(mode=0o700, parents=True)
+    if through == "link":  # in the folder that others may write to
+        (tmp_path / "code").mkdir(mode=0o700)
+        folder = above / "link"
+        folder.symlink_to(tmp_path / "code")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(folder))
+    above.chmod(mode)
+    assert jit._has_cache.__wrapped__() is is_used
+    if os.geteuid() == 0:
+        os.chown(above, 1234, 1234)
+        assert not jit._has_cache.__wrapped__()
+
+
 def _run(cache: Path) -> str:
     """The bytes of what a process of its own bakes."""
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}

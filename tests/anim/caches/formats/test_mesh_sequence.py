@@ -101,9 +101,9 @@ def test_quads_of_others_are_cut() -> None:
     [
         ({}, "nor is a_00001.obj"),
         ({"a.obj": b""}, "no vertices"),
-        ({"a.obj": b"v 0 0 x\n"}, "is no .obj"),
+        ({"a.obj": b"v 0 0 x\n"}, "line 1: 'x' is no number"),
         ({"a.obj": b"v 0 0 nan\n"}, "NaN"),
-        ({"a.obj": b"v 0 0 0\nf 1 2 3\n"}, "vertex 2 of 1"),
+        ({"a.obj": b"v 0 0 0\nf 1 2 3\n"}, "line 2: a face uses vertex 3 of 1"),
         ({"a_1.obj": b"v 0 0 0\nv 0 0 1\n", "a_2.obj": b"v 0 0 0\n"}, "'a_2.obj' has 1 vertices"),
     ],
 )

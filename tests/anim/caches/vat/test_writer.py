@@ -178,12 +178,58 @@ def test_damaged_or_missing_files_are_refused(name: str, cut: int | None) -> Non
         opened(files).load_all()
 
 
-@pytest.mark.parametrize("name", ["frames", "height"])
-def test_a_json_that_contradicts_its_times_is_refused(name: str) -> None:
+@pytest.mark.parametrize(
+    ("path", "value", "problem"),
+    [
+        ("frames", 10**9, "frames is 1000000000 (expected 7, by times_s and rows_per_frame)"),
+        ("height", 10**9, "height is 1000000000 (expected 7, by times_s and rows_per_frame)"),
+        ("vertices", 99, "vertices is 99 (expected 9 or fewer, by width and rows_per_frame)"),
+        ("fps", "x", "fps is 'x' (expected a number above 0)"),
+        ("fps", -1, "fps is -1 (expected a number above 0)"),
+        ("width", "4", "width is '4' (expected a whole number, 1 or more)"),
+        ("width", True, "width is True (expected a whole number, 1 or more)"),
+        ("rows_per_frame", 1.5, "rows_per_frame is 1.5 (expected a whole number, 1 or more)"),
+        ("uv_set", [1], "uv_set is [1] (expected a whole number, 0 or more)"),
+        ("uv_v", "left", "uv_v is 'left' (expected 'top' or 'bottom')"),
+        ("up", "x", "up is 'x' (expected 'y' or 'z')"),
+        ("origin", "bottom left", "origin is 'bottom left' (expected 'top left')"),
+        ("schema", 2, "schema is 2 (expected 1)"),
+        ("preset", "blender", "preset is 'blender' (expected 'plain' or 'three' or "),
+        ("mesh", 5, "mesh is 5 (expected text)"),
+        ("times_s", 5, "times_s is 5 (expected one or more numbers)"),
+        ("times_s", [0, "1"], "times_s[1] is '1' (expected a number)"),
+        ("times_s", [0, float("nan")], "times_s[1] is nan (expected a number)"),
+        ("position", None, "position is None (expected an object)"),
+        ("position.format", "int8", "position.format is 'int8' (expected 'float' or 'half' or 'unorm16')"),
+        ("position.encoding", "delta", "position.encoding is 'delta' (expected 'absolute' or 'offset')"),
+        ("position.scale", [1, 2], "position.scale is [1, 2] (expected 3 numbers)"),
+        ("position.offset", [1, 10**400, 1], "position.offset[1] is 1000000000"),
+        ("normal.format", "half", "normal.format is 'half' (expected 'unorm16')"),
+        ("normal.file", 1, "normal.file is 1 (expected text)"),
+        ("engine.axes", "x z y", "engine.axes is 'x z y' (expected 'x y z')"),
+        ("engine.signs", [-1, 1, 1], "engine.signs is (-1.0, 1.0, 1.0) (expected (1, 1, 1), as preset plain has)"),
+        ("engine.units_per_meter", 100, "engine.units_per_meter is 100.0 (expected 1.0, as preset plain has)"),
+    ],
+)
+def test_members_of_the_json_are_checked(path: str, value: object, problem: str) -> None:
     files, _ = written(cache(), "a.png")
     content = json.loads(files.files["a.png.json"])
-    files.files["a.png.json"] = json.dumps({**content, name: 10**9}).encode()
-    with pytest.raises(FormatError, match="contradicts itself"):
+    *parents, key = path.split(".")
+    place = content[parents[0]] if parents else content
+    place[key] = value
+    files.files["a.png.json"] = json.dumps(content).encode()
+    with pytest.raises(FormatError) as caught:
+        opened(files)
+    assert problem in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["vertices", "width", "times_s", "position", "mesh", "up", "preset"])
+def test_members_that_are_not_there_are_named(name: str) -> None:
+    files, _ = written(cache(), "a.png")
+    content = json.loads(files.files["a.png.json"])
+    del content[name]
+    files.files["a.png.json"] = json.dumps(content).encode()
+    with pytest.raises(FormatError, match=f"has no member '{name}'"):
         opened(files)
 
 

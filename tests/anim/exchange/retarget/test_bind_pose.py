@@ -91,6 +91,15 @@ def with_a_shared_joint_in_two_units(rig: Rig) -> Rig:
     return rig[0], [(holder, skin), (holder, _times(_half(skin, _is_upper(rig)), CENTIMETERS)), *more]
 
 
+def with_repeated_joints(rig: Rig) -> Rig:
+    """A third of the joints named again with matrices of another scale, which don't count."""
+    (holder, skin), *more = rig[1]
+    again = np.arange(len(skin.joints)) % 3 == 0
+    wrong = _times(_half(skin, again), np.diag((5.0, 5.0, 5.0, 1.0))[:3])
+    joints = np.concatenate((skin.joints, wrong.joints))
+    return rig[0], [(holder, Skin(joints, np.concatenate((skin.inverse_bind, wrong.inverse_bind)))), *more]
+
+
 def under_a_scaled_armature(rig: Rig) -> Rig:
     """Joints in centimeters below a node that makes meters of them, and turns z up to y up."""
     bones, top = rig[0], len(rig[0])
@@ -121,6 +130,7 @@ RIGS: list[Callable[[Rig], Rig]] = [
     with_two_skins,
     with_two_units,
     with_a_shared_joint_in_two_units,
+    with_repeated_joints,
     under_a_scaled_armature,
 ]
 EACH = pytest.mark.parametrize("build", RIGS, ids=lambda build: build.__name__)

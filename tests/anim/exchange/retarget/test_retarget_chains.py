@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import UnsupportedError
 from anim.exchange.euler.curve import Curve, Mode, linear, uniform_modes
 from anim.exchange.euler.from_euler import from_euler
 from anim.exchange.euler.motion import EulerMotion, EulerNode
@@ -90,7 +90,7 @@ def test_a_motion_of_days_is_not_looked_through_for_contacts() -> None:
     turning = (linear(days, np.array((0.0, 1.0))),) * 3
     source = from_euler(EulerMotion((replace(_keyed("tail1", -1), rotation=turning),)), tolerance=1e-3)
     target = Scene(tail(np.array((0, 0, 0, 1.0))), ())
-    with pytest.raises(RangeError, match="the motion lasts 200000 s: too long"):
+    with pytest.raises(UnsupportedError, match="the motion lasts 200000 s: too long"):
         apply_to_character(source, target, aliases={}, nested=True)
     clip = apply_to_character(source, target, aliases={}, nested=True, floor=GroundMode.KEEP).clip
     assert clip.end == days[1]

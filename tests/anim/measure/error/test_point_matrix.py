@@ -10,7 +10,8 @@ import pytest
 
 from anim.arrays import Floats
 from anim.measure.error import point_matrix as points_
-from anim.measure.error.point_matrix import CARRIED, OneJointRows, PointMatrix, all_points, sample_points, stack_points
+from anim.measure.error.point_matrix import CARRIED, PointMatrix, all_points, sample_points
+from anim.measure.error.point_rows import OneJointRows, stack_points
 from anim.measure.error.surface import surfaces
 from anim.model import MeshInstance, Scene, Skin
 from anim.sampling import rest_pose, world_matrices

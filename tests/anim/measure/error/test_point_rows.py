@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from anim.measure.error import point_matrix as points_
-from anim.measure.error.point_matrix import BLOCK_ROWS, MAX_USED_FRACTION, OneJointRows, PointMatrix, stack_points
+from anim.measure.error import point_rows
+from anim.measure.error.point_matrix import PointMatrix
+from anim.measure.error.point_rows import BLOCK_ROWS, MAX_USED_FRACTION, OneJointRows, stack_points
 
 NODES, FRAMES = 40, 5
 
@@ -59,7 +61,7 @@ def test_blocks_are_the_rows_of_all_moves(
 def test_points_by_joint_need_few_columns_in_a_block() -> None:
     used = []
     for points in (_points(1000, 2), _points(1000, 2).by_joint()):
-        blocks = list(points_._dense_blocks(points.rows()._matrix))
+        blocks = list(point_rows._dense_blocks(points.rows()._matrix))
         used.append([NODES * 4 if columns is None else len(columns) for _, columns, _ in blocks])
     assert used[0] == [NODES * 4] * -(-1000 // BLOCK_ROWS)
     assert max(used[1]) < MAX_USED_FRACTION / 2 * 4 * NODES

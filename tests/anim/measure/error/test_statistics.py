@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation, Slerp
 
 from anim.arrays import Floats
 from anim.gltf.reading import reader
@@ -17,9 +16,10 @@ from anim.measure.error.displacement import MorphedDisplacement
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import dense_times, key_and_mid_times
 from anim.measure.error.statistics import FRAMES, SLACK, Peak, speed_error, statistics
-from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, TimeAxis, Track
+from anim.model import Clip, Mesh, MeshInstance, Scene, TimeAxis, Track
 from anim.operations.resample import resample
 from anim.sampling.times import frame_times
+from tests.anim.measure.error.plain_positions import plain_vertices, plain_world
 from tests.clips import CUBICSPLINE, STEP, about, clip, skeleton, track
 from tests.files import opened_fixture, opened_path
 
@@ -107,7 +107,7 @@ def test_turns_are_those_of_the_world(versions: tuple[Scene, Clip, Clip]) -> Non
     angles = [
         (one[1].inv() * other[1]).magnitude()
         for time in times
-        for one, other in zip(*(_world(scene.skeleton, each, time) for each in (before, after)), strict=True)
+        for one, other in zip(*(plain_world(scene.skeleton, each, time) for each in (before, after)), strict=True)
     ]
     assert found.angle.size == pytest.approx(max(angles), abs=1e-7)
 
@@ -271,55 +271,7 @@ def _points(points: list[list[float]], *, targets: list[list[list[float]]] | Non
 
 def _apart(scene: Scene, before: Clip, after: Clip, time: float) -> Floats:
     """How far every vertex is displaced (V, 3), by sums over joints of 4 x 4 matrices."""
-    return np.array(_vertices(scene, after, time)) - np.array(_vertices(scene, before, time))
-
-
-def _vertices(scene: Scene, played: Clip, time: float) -> list[Floats]:
-    world = [_matrix(*each) for each in _world(scene.skeleton, played, time)]
-    result = []
-    for instance in scene.instances:
-        assert instance.skin is not None
-        binds = zip(instance.skin.joints.tolist(), instance.skin.inverse_bind, strict=True)
-        bound = [world[joint] @ np.vstack((bind, [0, 0, 0, 1])) for joint, bind in binds]
-        for v, point in enumerate(instance.mesh.positions):
-            influences = zip(instance.mesh.joints[v], instance.mesh.weights[v], strict=True)
-            result.append(sum(w * (bound[j] @ [*point, 1])[:3] for j, w in influences))
-    return result
-
-
-def _world(nodes: Skeleton, played: Clip, time: float) -> list[tuple[Floats, Rotation]]:
-    """Place and turn of every node against the world; the fixtures' nodes have no scale."""
-    by_target = {each.target: each for each in played.tracks}
-    result: list[tuple[Floats, Rotation]] = []
-    for node, parent in enumerate(nodes.parents.tolist()):
-        assert parent < node
-        place, turn = nodes.translation[node].copy(), Rotation.from_quat(nodes.rotation[node])
-        if (node, "translation") in by_target:
-            place = _lerp(by_target[node, "translation"], time)
-        if (node, "rotation") in by_target:
-            turn = _slerp(by_target[node, "rotation"], time)
-        if parent >= 0:
-            above, around = result[parent]
-            place, turn = above + around.apply(place), around * turn
-        result.append((place, turn))
-    return result
-
-
-def _matrix(place: Floats, turn: Rotation) -> Floats:
-    whole = np.eye(4)
-    whole[:3, :3], whole[:3, 3] = turn.as_matrix(), place
-    return whole
-
-
-def _lerp(each: Track, time: float) -> Floats:
-    return np.array([np.interp(time, each.times, each.values[:, i]) for i in range(3)])
-
-
-def _slerp(each: Track, time: float) -> Rotation:
-    turns = Rotation.from_quat(each.values)
-    if len(each.times) == 1:
-        return turns[0]
-    return Slerp(each.times, turns)(np.clip(time, each.times[0], each.times[-1]))
+    return np.array(plain_vertices(scene, after, time)) - np.array(plain_vertices(scene, before, time))
 
 
 def test_without_vertices_the_points_of_shells_count() -> None:

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.point_matrix import PointMatrix, stack_points
+from anim.measure.error.point_matrix import PointMatrix
+from anim.measure.error.point_rows import stack_points
 from anim.model import Clip, Scene
 from anim.optimization.search.source_motion import PATHS
 from anim.optimization.search.stacked_clips import END_WEIGHT, StackedClips

@@ -1,0 +1,48 @@
+"""Outputs that are written into instead of replaced: devices, named pipes, and what this process has open."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+STANDARD_STREAMS = {"stdout": 1, "stderr": 2}  # in /dev
+DESCRIPTOR_FOLDERS = ("/dev/fd", "/proc/self/fd", "/proc/thread-self/fd")
+MAX_LINKS = 40  # that Linux follows
+
+
+def is_special(path: Path) -> bool:
+    """Return whether a path is written directly: a device, a named pipe, or what this process has open."""
+    return descriptor_of(path) is not None or (path.exists() and not path.is_file())
+
+
+def open_special(path: Path) -> BinaryIO:
+    """Open it for writing: an open file at its position, which opening its path again would lose."""
+    number = descriptor_of(path)
+    return path.open("wb", buffering=0) if number is None else os.fdopen(os.dup(number), "wb", buffering=0)
+
+
+def descriptor_of(path: Path) -> int | None:
+    """Return the number of the open file that a path names: 1 of /dev/stdout, 3 of /dev/fd/3; None for other paths.
+
+    Also of a link to such a path, and of other spellings: //dev/stdout.
+    """
+    folders = {os.path.realpath(each) for each in DESCRIPTOR_FOLDERS}
+    for each in _followed(str(path)):
+        folder, name = os.path.split(each)
+        folder = os.path.realpath(folder).replace("//", "/")  # POSIX keeps two slashes at the start
+        if folder == "/dev" and name in STANDARD_STREAMS:
+            return STANDARD_STREAMS[name]
+        if folder in folders and name.isascii() and name.isdigit() and len(name) < 10:
+            return int(name)
+    return None
+
+
+def _followed(path: str) -> Iterator[str]:
+    """A path, and what it leads to link by link: the last of /dev/stdout would be the file behind it."""
+    for _ in range(MAX_LINKS):
+        yield path
+        if not os.path.islink(path):
+            return
+        path = os.path.join(os.path.dirname(path), os.readlink(path))
