@@ -10,8 +10,8 @@ from anim.arrays import Floats
 from anim.model import Skin
 
 BIND_TOLERANCE_PER_DIAGONAL = 1e-6  # of the mesh, to its corners: rounding of float32 matrices
-IDENTITY_TOLERANCE = 1e-6
-MAX_POSES_PER_JOINT = 16  # compared with a skin; a character has a few, and each skin with all would be quadratic
+IDENTITY, IDENTITY_TOLERANCE = np.eye(4), 1e-6
+MAX_POSES_PER_JOINT = 8  # compared with a skin; a character has a few, and each skin with all would be quadratic
 
 
 class BindPoses:
@@ -44,21 +44,32 @@ def _key(skin: Skin) -> tuple[bytes, bytes]:
     return skin.joints.tobytes(), skin.inverse_bind.tobytes()
 
 
-def matrix_into(group: Mapping[int, Floats], binds: Mapping[int, Floats], positions: Floats) -> Floats | None:
-    """Return the matrix (4, 4) from a mesh to the bind pose of a skeleton; None if there is none, or no common joint.
+class BindPose:
+    """Bind pose of a mesh.
 
-    group, binds: (4, 4) by node, joint_from_skeleton and joint_from_mesh. positions: (V, 3) of the mesh.
+    binds: joint_from_mesh (4, 4) by node. positions: (V, 3) of the mesh.
     """
-    common = [node for node in binds if node in group]
-    if not common:
-        return None
-    matrix = np.linalg.inv(group[common[0]]) @ binds[common[0]]
-    if np.abs(matrix - np.eye(4)).max() < IDENTITY_TOLERANCE:
-        matrix = np.eye(4)
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    corners = np.array([(x, y, z, 1) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    limit = BIND_TOLERANCE_PER_DIAGONAL * float(np.linalg.norm(high - low))
-    wanted, own = (np.array([each[node] for node in common]) for each in (group, binds))
-    difference = np.linalg.inv(own) @ (wanted @ matrix) - np.eye(4)
-    moved = corners @ difference.swapaxes(-1, -2)
-    return matrix if np.linalg.norm(moved[..., :3], axis=-1).max() <= limit else None
+
+    def __init__(self, binds: Mapping[int, Floats], positions: Floats) -> None:
+        self._binds, self._number = binds, {node: i for i, node in enumerate(binds)}
+        self._inverse = np.linalg.inv(np.array([*binds.values()]))
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        box = [(x, y, z, 1) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+        self._corners = np.array(box)
+        self._limit = BIND_TOLERANCE_PER_DIAGONAL * float(np.linalg.norm(high - low))
+
+    def matrix_into(self, group: Mapping[int, Floats]) -> Floats | None:
+        """Return the matrix (4, 4) from the mesh to the bind pose of a skeleton; None for none, or no common joint.
+
+        group: joint_from_skeleton (4, 4) by node.
+        """
+        common = [node for node in self._binds if node in group]
+        if not common:
+            return None
+        matrix = np.linalg.inv(group[common[0]]) @ self._binds[common[0]]
+        if np.abs(matrix - IDENTITY).max() < IDENTITY_TOLERANCE:
+            matrix = np.eye(4)
+        inverse = self._inverse[[self._number[node] for node in common]]
+        difference = inverse @ (np.array([group[node] for node in common]) @ matrix) - IDENTITY
+        moved = (self._corners @ difference.swapaxes(-1, -2))[..., :3]
+        return matrix if np.sqrt((moved * moved).sum(axis=-1).max()) <= self._limit else None

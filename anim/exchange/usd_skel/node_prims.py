@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,16 +80,16 @@ class NodePrims:
         operation.Set(kind(*rest[0].tolist()))
         if moves:
             values = quaternion.align_signs(rows) if rows.shape[1] == 4 else rows
-            set_samples(operation, [kind(*row) for row in values.tolist()], self._codes, values)
+            set_samples(operation, lambda row: kind(*row.tolist()), self._codes, values)
 
 
-def set_samples(attribute: Any, values: Sequence[Any], codes: Sequence[float], rows: AnyArray) -> None:
-    """Set an attribute at time codes; values that stay the same are one default. rows: (F, …) for that comparison."""
+def set_samples(attribute: Any, make: Callable[[AnyArray], Any], codes: Sequence[float], rows: AnyArray) -> None:
+    """Set an attribute at time codes; rows (F, …) that stay the same are one default. make: a row → a value of USD."""
     if (rows == rows[0]).all():
-        attribute.Set(values[0])
+        attribute.Set(make(rows[0]))
         return
-    for value, code in zip(values, codes, strict=True):
-        attribute.Set(value, code)
+    for row, code in zip(rows, codes, strict=True):
+        attribute.Set(make(row), code)
 
 
 def plain_text(name: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.errors import UnsupportedError
-from anim.exchange.usd_skel.bind_poses import BindPoses, matrix_into
+from anim.exchange.usd_skel.bind_poses import BindPose, BindPoses
 from anim.exchange.usd_skel.joint_hierarchy import NodeOrder, join_joints
 from anim.model import MeshInstance, Scene, Skin
 from anim.sampling.pose import rest_world
@@ -70,9 +70,10 @@ def group_skeletons(
                 morphed.append(SkeletonGroup(instance.node, members=[(instance, np.eye(4))]))
             continue
         binds = _inverse_binds(instance, instance.skin, scene, rest)
+        pose = BindPose(binds, instance.mesh.positions)
         for number in poses.candidates(instance.skin):
             group = groups[number]
-            matrix = matrix_into(group.inverse_bind, binds, instance.mesh.positions)
+            matrix = pose.matrix_into(group.inverse_bind)
             if matrix is not None:
                 break
         else:

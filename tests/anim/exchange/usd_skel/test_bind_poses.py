@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anim.exchange.usd_skel import skeleton_group
-from anim.exchange.usd_skel.bind_poses import MAX_POSES_PER_JOINT, BindPoses
+from anim.exchange.usd_skel.bind_poses import MAX_POSES_PER_JOINT, BindPose, BindPoses
 from anim.gltf.reading import reader
 from anim.model import Skin
 from tests import many
@@ -40,7 +40,7 @@ def test_an_equal_skin_is_found_behind_many_others() -> None:
 
 def test_each_skin_is_compared_with_few(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = reader.scene(opened(many.skins_different(100)))
-    counted = count_calls(monkeypatch, skeleton_group, "matrix_into")
+    counted = count_calls(monkeypatch, BindPose, "matrix_into")
     groups = skeleton_group.group_skeletons(scene, scene.instances)
     assert len(groups) == 100
     assert len(counted) <= MAX_POSES_PER_JOINT * 100
