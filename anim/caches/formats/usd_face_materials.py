@@ -33,7 +33,7 @@ def face_materials(document: Json, faces: Ints, primitives: Sequence[tuple[Json,
     used = [each.get("material", DEFAULT_MATERIAL) for each, _ in primitives]
     for number in used:
         find_material(document, number)
-    if not len(faces) or not used:
+    if not len(faces) or set(used) <= {DEFAULT_MATERIAL}:
         return FaceMaterials([], [])
     starts = np.array([span[0] for _, span in primitives])
     of_face = np.array(used)[np.searchsorted(starts, faces[:, 0], side="right") - 1]

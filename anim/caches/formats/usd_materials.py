@@ -52,6 +52,8 @@ class UsdMaterials:
     def add_prims(self, numbers: Iterable[int]) -> None:
         """Make the prims of materials, which `define` fills, in one change."""
         new = [number for number in dict.fromkeys(numbers) if number not in self._added]
+        if not new:
+            return
         self._added.update(new)
         paths = [f"{self._scope}/{_material_name(number)}" for number in new]
         define_prims(
