@@ -67,8 +67,8 @@ LAZY = {"scipy", "trimesh", "meshopt", "pygltflib", "numba", "llvmlite", "matplo
 LAZY |= {"mujoco", "pxr", "alembic3d", "imath", "dask", "distributed", "rapier3d"}
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
-    "caches.formats": "flipbook_reader gltf mesh_sequence usd_losses usd_materials usd_stage",
-    "caches.source_document": "bake_source lit_meshes shading_normals",
+    "caches.formats": "flipbook_reader gltf mesh_sequence usd_losses usd_face_materials usd_materials usd_stage",
+    "caches.source_document": "bake_source lit_meshes shading_normals still_source",
     "caches.transforms": "resample statistics up_axis vertex_order",
     "caches.vat": "presets",
     "check.rules": "invalid",

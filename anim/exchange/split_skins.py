@@ -10,12 +10,17 @@ from anim.arrays import Ints
 from anim.model import Mesh, Skeleton, Skin
 
 
-def split_by_root(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh, Skin]]:
+def split_by_root(
+    skeleton: Skeleton, mesh: Mesh, skin: Skin, *, max_meshes: int | None = None
+) -> list[tuple[Mesh, Skin]]:
     """Return a mesh and its skin for each root that has joints, with numbered names if several.
 
-    mesh: each triangle is bound to joints of one tree, without shared vertices.
+    mesh: each triangle is bound to joints of one tree, without shared vertices. max_meshes: of more roots neighbors
+    share a mesh; programs draw it, but it is not valid glTF.
     """
     root_of = _roots(skeleton)[skin.joints]
+    if max_meshes is not None:
+        root_of = _grouped(root_of, max_meshes)
     roots = np.unique(root_of)
     if len(roots) < 2:
         return [(mesh, skin)]
@@ -38,6 +43,12 @@ def split_by_root(skeleton: Skeleton, mesh: Mesh, skin: Skin) -> list[tuple[Mesh
         )
         bodies.append((body, Skin(skin.joints[own], skin.inverse_bind[own])))
     return bodies
+
+
+def _grouped(root_of: Ints, count: int) -> Ints:
+    """Numbers (n,) of at most `count` groups of neighboring roots, from the root of each element."""
+    roots, rank = np.unique(root_of, return_inverse=True)
+    return np.asarray(rank // max(-(-len(roots) // count), 1), np.int64)
 
 
 def _parts(root_of: Ints, roots: Ints) -> list[Ints]:

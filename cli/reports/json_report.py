@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 
 from anim.errors import FormatError
+from cli.reports.indented_json import IndentedJson
 
 
 def dump(content: object, *, indent: int | None = 1) -> str:
@@ -17,7 +18,7 @@ def dump(content: object, *, indent: int | None = 1) -> str:
         if indent is None:
             text.write(json.dumps(content, allow_nan=False))
         else:  # piece by piece: a list of all pieces takes several times the memory of the text
-            json.dump(content, text, allow_nan=False, ensure_ascii=False, indent=indent)
+            IndentedJson(text.write, indent).value(content)
     except ValueError:
         check_finite(content)
         raise

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +20,11 @@ from anim.gltf.document import Document
 from anim.gltf.io import images
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
-from anim.gltf.writing import writer
 from anim.gltf.writing.draco_decoding import decode_draco
 from anim.model import Clip, Scene, VertexCache
 from anim.operations.selection import Selection
-from anim.operations.trim import trim
 from anim.sampling.times import frame_times
-from anim.skinning.bake import Baker, bakeable_instances, left_out_nodes, prepare_bake
+from anim.skinning.bake import Baker, bakeable_instances, prepare_bake
 
 
 class Output(NamedTuple):
@@ -105,31 +103,6 @@ def keeps_materials(ending: str) -> bool:
 def keeps_nodes(ending: str) -> bool:
     """Return whether a format keeps nodes, and so meshes that are not baked."""
     return "layout" in CACHE_FORMATS[ending].takes
-
-
-def source_options(
-    source: Source,
-    options: BakeOptions,
-    scene: Scene,
-    nodes: Sequence[int] | None,
-    clip: tuple[int | None, Clip],
-    *,
-    keep_skeleton: bool,
-    output: Output,
-) -> Mapping[str, Any]:
-    """Return the write option `source` of a format that keeps materials; else none.
-
-    nodes: of the baked meshes; None for all. Other meshes are then left out. clip: its index, and the clip.
-    """
-    if not keeps_materials(output.ending):
-        return {}
-    baked = {each.node for each in bakeable_instances(scene, rigid=options.rigid, nodes=nodes)}
-    left_out = left_out_nodes(scene, rigid=options.rigid, nodes=nodes)
-    document = prepare_source(source, {source.document.json["nodes"][node]["mesh"] for node in baked}, output)
-    index, played = clip
-    if index is not None and (options.start, options.end) != (None, None) and played.end > played.start:
-        document = writer.replace_clips(document, {index: trim(played, start=options.start, end=options.end)})
-    return {"source": BakeSource(document, index, left_out, options.space == "mesh", keep_skeleton)}
 
 
 def onto_source(

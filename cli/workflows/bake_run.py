@@ -24,8 +24,9 @@ from cli.progress import Progress
 from cli.reports import bake_notes
 from cli.reports.bake_report import BakedFile, report_written
 from cli.text import Reporter
-from cli.workflows.bake_clip import BakeOptions, Output, keeps_nodes, source_options
+from cli.workflows.bake_clip import BakeOptions, Output, keeps_nodes
 from cli.workflows.bake_jobs import BakeJob
+from cli.workflows.bake_source_options import BakeSources
 
 LINEAR = "lbs"  # blending as in every player, which other methods are compared with
 
@@ -67,7 +68,8 @@ class FileOptions:
 class GroupBaker:
     """Bakes clips of the meshes of a group, with what the notes need of them."""
 
-    def __init__(self, scene: Scene, nodes: Sequence[int] | None, options: BakeOptions) -> None:
+    def __init__(self, scene: Scene, nodes: Sequence[int] | None, options: BakeOptions, sources: BakeSources) -> None:
+        self.sources = sources
         self.baker = options.baker(scene, nodes)
         self.inbetween = InbetweenMetric(self.baker)
         is_linear = options.method == LINEAR
@@ -119,7 +121,8 @@ class BakeRun:
             measured = MeasuredBake(group.baker, group.linear, clip, times, progress)
         baked = group.baker.bake(clip, times=times, progress=progress) if measured is None else measured.cache
         cache = self._file_options.transform(baked)
-        source = self._source_option(job, nodes, clip)
+        output = Output(job.file, self._file_options.ending, self._file_options.dry_run)
+        source = group.sources.option(job.clip, clip, output)
         try:
             saved = self._file_options.save(cache, job.file, source)
         finally:
@@ -140,17 +143,7 @@ class BakeRun:
     def _baker(self, index: int, nodes: Sequence[int] | None) -> GroupBaker:
         """Return the baker of a group; that of one group at a time is in memory."""
         if self._group is None or self._group[0] != index:
-            self._group = index, GroupBaker(self._scene, nodes, self._options)
+            keep_skeleton = self._file_options.keep_skeleton
+            sources = BakeSources(self._source, self._scene, nodes, self._options, keep_skeleton=keep_skeleton)
+            self._group = index, GroupBaker(self._scene, nodes, self._options, sources)
         return self._group[1]
-
-    def _source_option(self, job: BakeJob, nodes: Sequence[int] | None, clip: Clip) -> Mapping[str, Any]:
-        options = self._file_options
-        return source_options(
-            self._source,
-            self._options,
-            self._scene,
-            nodes,
-            (job.clip, clip),
-            keep_skeleton=options.keep_skeleton,
-            output=Output(job.file, options.ending, options.dry_run),
-        )

@@ -24,7 +24,7 @@ from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
 from anim.optimization import clip_optimizer
 from anim.sampling.pose import PoseSampler
-from anim.skinning.analysis import collapse as collapse_analysis
+from anim.skinning.analysis import enclosed_volume, method_scores
 from cli.workflows import mesh_pairs
 from fixtures.broken.pieces import buffered, text
 from tests import many
@@ -233,12 +233,22 @@ def test_meshes_of_two_files_are_paired_by_tables(tmp_path: Path, monkeypatch: p
 
 def test_equal_skinned_meshes_are_compared_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "in.glb").write_bytes(many.skins(3))
-    counted = count_calls(monkeypatch, collapse_analysis, "bind_measures")
+    counted = count_calls(monkeypatch, method_scores, "_bind_measures")
     report = call("collapse", tmp_path / "in.glb", "--format", "json").json
     assert len(counted) == 1
     meshes = report["clips"][0]["meshes"]
     assert (report["skinned_meshes"], [each["mesh"] for each in meshes]) == (3, ["m0", "m1", "m2"])
     assert all({**each, "mesh": "", "node": 0} == {**meshes[0], "mesh": "", "node": 0} for each in meshes)
+
+
+def test_closed_parts_are_found_once_for_skins_on_the_same_shape(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.skins_different(20))
+    shapes = count_calls(monkeypatch, enclosed_volume, "watertight_faces")
+    sizes = count_calls(monkeypatch, method_scores, "model_size")
+    call("collapse", tmp_path / "in.glb").product()
+    assert (len(shapes), len(sizes)) == (1, 2)  # the size by each of two methods
 
 
 def test_skinned_meshes_share_the_poses_of_the_skeleton(

@@ -13,12 +13,14 @@ from anim.skinning import chunk_pipeline
 from anim.skinning.analysis.inbetween_error import InbetweenMetric
 from anim.skinning.bake import Baker
 from cli.io import documents
+from cli.workflows import bake_source_options
 from fixtures.broken.pieces import text
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
 from tests.cli.running import refusal
 from tests.cli.test_many import CLIPS, equal_clips
+from tests.files import opened
 
 
 def test_a_plot_computes_each_curve_once(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,3 +120,20 @@ def test_the_frame_rate_of_shared_times_is_estimated_once(
     report = json.loads(call("inspect", tmp_path / "in.glb", "--format", "json").product())
     assert [clip["frame_rate_fps"] for clip in report["files"][0]["clips"]] == [2] * 30
     assert len(estimates) == 1
+
+
+def test_the_source_of_textures_is_prepared_once_for_all_clips(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its animations are left out at once, not from each file: that took time in proportion to the square."""
+    (tmp_path / "in.glb").write_bytes(many.clips_different(4))
+    alone = [tmp_path / f"alone{i}.png" for i in range(4)]
+    for i, path in enumerate(alone):
+        call("bake", tmp_path / "in.glb", path, "--rigid", "--fps", "4", "--clip", f"#{i}").product()
+    prepared = count_calls(monkeypatch, bake_source_options, "prepare_source")
+    call("bake", tmp_path / "in.glb", tmp_path / "{clip}.png", "--rigid", "--fps", "4").product()
+    assert len(prepared) == 1
+    for i, path in enumerate(alone):
+        mesh = Path(f"{path}-mesh.glb").read_bytes()
+        assert (tmp_path / f"c{i}.png-mesh.glb").read_bytes() == mesh
+        assert "animations" not in opened(mesh).json

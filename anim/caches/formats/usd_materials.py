@@ -14,6 +14,8 @@ import numpy as np
 
 from anim.arrays import AnyArray, Ints
 from anim.caches.formats.texture_coordinates import texture_coordinates
+from anim.caches.formats.usd_face_materials import DEFAULT_MATERIAL, face_materials
+from anim.caches.formats.usd_stage import define_prims
 from anim.caches.formats.usd_surface_inputs import TextureInput, constant_inputs, input_types, texture_inputs
 from anim.caches.source_document.bake_source import BakedMesh, Span, baked_meshes
 from anim.caches.source_document.checked_materials import find_item, find_material
@@ -45,7 +47,18 @@ class UsdMaterials:
         self._document, self._stage, self._scope, self._note = document, stage, scope, note
         self._accessors, self._save_image = Accessors(document), save_image
         self._files: dict[tuple[int | None, str], str] = {}
-        self._defined: dict[int, Any] = {}
+        self._added, self._defined = set[int](), dict[int, Any]()
+
+    def add_prims(self, numbers: Iterable[int]) -> None:
+        """Make the prims of materials, which `define` fills, in one change."""
+        new = [number for number in dict.fromkeys(numbers) if number not in self._added]
+        if not new:
+            return
+        self._added.update(new)
+        paths = [f"{self._scope}/{_material_name(number)}" for number in new]
+        define_prims(
+            self._stage, [each for path in paths for each in ((path, "Material"), (f"{path}/surface", "Shader"))]
+        )
 
     def define(self, number: int) -> Any:
         """Return material `number` of the document, or glTF's default for -1, defined on its first use."""
@@ -185,25 +198,22 @@ def bind_primitives(
 
     for number in sorted({number for each, _ in primitives for number in _coordinate_sets(document.json, each)}):
         _add_coordinates(document, mesh, primitives, number, num_vertices)
-    used = [each.get("material", -1) for each, _ in primitives]
-    about = [find_material(document.json, number) for number in used]
+    about = [find_material(document.json, each.get("material", DEFAULT_MATERIAL)) for each, _ in primitives]
     materials.note_losses(each for each, _ in primitives)
     mesh.CreateDoubleSidedAttr(any(each.get("doubleSided", False) for each in about))
-    starts = np.array([span[0] for _, span in primitives])
-    owner: Ints = np.searchsorted(starts, faces[:, 0], side="right") - 1
-    of_face = np.array(used)[owner] if len(owner) else np.empty(0, np.int64)
-    numbers = sorted(set(of_face.tolist()))
-    if numbers in ([], [-1]):
+    shown = face_materials(document.json, faces, primitives)
+    materials.add_prims(shown.numbers)
+    defined = [materials.define(number) for number in shown.numbers]
+    if len(defined) <= 1:
+        for material in defined:
+            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
         return
-    defined = {number: materials.define(number) for number in numbers}
-    if len(numbers) == 1:
-        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(defined[numbers[0]])
-        return
-    for number in numbers:
-        rows = Vt.IntArray.FromNumpy(np.flatnonzero(of_face == number).astype(np.int32))
-        name, family = _material_name(number), UsdShade.Tokens.materialBind
+    names = [_material_name(number) for number in shown.numbers]
+    define_prims(mesh.GetPrim().GetStage(), [(f"{mesh.GetPath()}/{name}", "GeomSubset") for name in names])
+    for name, material, own in zip(names, defined, shown.faces, strict=True):
+        rows, family = Vt.IntArray.FromNumpy(own.astype(np.int32)), UsdShade.Tokens.materialBind
         subset = UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, rows, family)
-        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(defined[number])
+        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
     UsdShade.MaterialBindingAPI(mesh.GetPrim()).SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
 
 

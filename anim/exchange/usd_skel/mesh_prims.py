@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from anim.arrays import AnyArray, Floats, Ints
-from anim.caches.formats.usd_stage import vectors
+from anim.caches.formats.usd_stage import define_prims, vectors
 from anim.exchange.usd_skel.blend_weights import NEGATIVE_SUFFIX, ScaledTarget
-from anim.exchange.usd_skel.prim_names import unique, valid
+from anim.exchange.usd_skel.prim_names import UniqueNames, valid
 from anim.gltf.document import Json
 from anim.model import Mesh, MeshInstance
 
@@ -60,7 +60,7 @@ def _bind(prim: Any, joints: AnyArray, weights: Floats, to_skeleton: Floats) -> 
 
 
 def add_blend_shapes(
-    stage: Any, prim: Any, mesh: Mesh, shapes: Sequence[ScaledTarget], about: Json, taken: set[str]
+    stage: Any, prim: Any, mesh: Mesh, shapes: Sequence[ScaledTarget], about: Json, taken: UniqueNames
 ) -> list[str]:
     """Add morph targets of a mesh as blend shapes; return their names, which no other mesh of the skeleton has.
 
@@ -69,12 +69,12 @@ def add_blend_shapes(
     from pxr import UsdSkel
 
     path = prim.GetPath()
-    own = {each.GetName() for each in prim.GetPrim().GetChildren()}
-    names, targets = list[str](), list[Any]()
-    for each in shapes:
-        name = unique(target_name(about, each.target) + (NEGATIVE_SUFFIX if each.factor < 0 else ""), own)
-        own.add(name)
-        shape = UsdSkel.BlendShape.Define(stage, path.AppendChild(name))
+    own = UniqueNames(each.GetName() for each in prim.GetPrim().GetChildren())
+    given = [target_name(about, each.target) + (NEGATIVE_SUFFIX if each.factor < 0 else "") for each in shapes]
+    targets = [path.AppendChild(own.add(name)) for name in given]
+    define_prims(stage, [(str(target), "BlendShape") for target in targets])
+    for each, target in zip(shapes, targets, strict=True):
+        shape = UsdSkel.BlendShape(stage.GetPrimAtPath(target))
         offsets, normal_offsets = _offsets(mesh, each)
         moved = _moved(offsets, normal_offsets)
         shape.CreateOffsetsAttr(vectors(offsets[moved]))
@@ -82,9 +82,7 @@ def add_blend_shapes(
             shape.CreateNormalOffsetsAttr(vectors(normal_offsets[moved]))
         if len(moved) < len(offsets):
             _set_points(shape, moved)
-        names.append(unique(name, taken))
-        taken.add(names[-1])
-        targets.append(shape.GetPath())
+    names = [taken.add(target.name) for target in targets]
     binding = UsdSkel.BindingAPI.Apply(prim.GetPrim())
     binding.CreateBlendShapesAttr(names)
     binding.CreateBlendShapeTargetsRel().SetTargets(targets)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from anim.arrays import AnyArray, Floats
-from anim.caches.formats.usd_stage import ROOT
+from anim.caches.formats.usd_stage import ROOT, define_prims
 from anim.exchange.usd_skel.prim_names import PrimNames
 from anim.maths import quaternion
 from anim.model.skeleton import ancestors
@@ -31,23 +31,31 @@ class NodePrims:
     def add(self, nodes: Iterable[int]) -> None:
         """Make the prims of nodes and those above them, siblings in the order of the file."""
         skeleton = self._rest.skeleton
-        wanted = {node for each in nodes if each >= 0 for node in (each, *ancestors(skeleton.parents, each))}
-        for level in skeleton.levels():
-            for node in level.tolist():
-                if node in wanted and node not in self._paths:
-                    self._define(node)
+        wanted = set[int]()
+        for node in nodes:
+            for each in (node, *ancestors(skeleton.parents, node)):
+                if each < 0 or each in wanted:
+                    break
+                wanted.add(each)
+        wanted -= self._paths.keys()
+        new = [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
+        for node in new:
+            parent = self.path(int(skeleton.parents[node]))
+            self._paths[node] = self.names.child(parent, skeleton.names[node] or f"node{node}")
+        define_prims(self._stage, [(self._paths[node], "Xform") for node in new])
+        for node in new:
+            self._set_transform(node)
 
     def path(self, node: int) -> str:
         """Return the path of a node's prim; of −1 that of the stage's root."""
         return ROOT if node < 0 else self._paths[node]
 
-    def _define(self, node: int) -> None:
+    def _set_transform(self, node: int) -> None:
         from pxr import Gf, UsdGeom
 
         skeleton = self._rest.skeleton
-        path = self.names.child(self.path(int(skeleton.parents[node])), skeleton.names[node] or f"node{node}")
-        self._paths[node] = path
-        prim = UsdGeom.Xform.Define(self._stage, path)
+        path = self._paths[node]
+        prim = UsdGeom.Xform(self._stage.GetPrimAtPath(path))
         if skeleton.names[node] and skeleton.names[node] != path.rsplit("/", 1)[1]:
             prim.GetPrim().SetDisplayName(plain_text(skeleton.names[node]))
         sheared = np.flatnonzero(skeleton.sheared == node)
@@ -72,16 +80,16 @@ class NodePrims:
         operation.Set(kind(*rest[0].tolist()))
         if moves:
             values = quaternion.align_signs(rows) if rows.shape[1] == 4 else rows
-            set_samples(operation, [kind(*row) for row in values.tolist()], self._codes, values)
+            set_samples(operation, lambda row: kind(*row.tolist()), self._codes, values)
 
 
-def set_samples(attribute: Any, values: Sequence[Any], codes: Sequence[float], rows: AnyArray) -> None:
-    """Set an attribute at time codes; values that stay the same are one default. rows: (F, …) for that comparison."""
+def set_samples(attribute: Any, make: Callable[[AnyArray], Any], codes: Sequence[float], rows: AnyArray) -> None:
+    """Set an attribute at time codes; rows (F, …) that stay the same are one default. make: a row → a value of USD."""
     if (rows == rows[0]).all():
-        attribute.Set(values[0])
+        attribute.Set(make(rows[0]))
         return
-    for value, code in zip(values, codes, strict=True):
-        attribute.Set(value, code)
+    for row, code in zip(rows, codes, strict=True):
+        attribute.Set(make(row), code)
 
 
 def plain_text(name: str) -> str:

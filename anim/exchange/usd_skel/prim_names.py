@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from anim.arrays import Ints
 
@@ -11,14 +11,28 @@ class PrimNames:
     """Names that are taken, by the path of the parent."""
 
     def __init__(self) -> None:
-        self._taken: dict[str, set[str]] = {}
+        self._taken: dict[str, UniqueNames] = {}
 
     def child(self, parent: str, name: str) -> str:
         """Return the path of a new child: child("/root", "left arm") → "/root/left_arm", then "/root/left_arm_2"."""
-        taken = self._taken.setdefault(parent, set())
-        found = unique(valid(name), taken)
-        taken.add(found)
-        return f"{parent}/{found}"
+        return f"{parent}/{self._taken.setdefault(parent, UniqueNames()).add(valid(name))}"
+
+
+class UniqueNames:
+    """Names that differ, of which many may have been the same."""
+
+    def __init__(self, names: Iterable[str] = ()) -> None:
+        self._taken, self._last = set(names), dict[str, int]()
+
+    def add(self, name: str) -> str:
+        """Take and return the name, with a number if it is taken: add("arm") → "arm", then "arm_2"."""
+        found, number = name, self._last.get(name, 1)
+        while found in self._taken:
+            number += 1
+            found = f"{name}_{number}"
+        self._taken.add(found)
+        self._last[name] = number
+        return found
 
 
 def valid(name: str) -> str:
@@ -30,15 +44,6 @@ def valid(name: str) -> str:
 
     given = f"_{name}" if name[:1].isdecimal() else name  # which would be replaced
     return str(Tf.MakeValidIdentifier(given.encode(errors="replace").decode()))
-
-
-def unique(name: str, taken: set[str]) -> str:
-    """Return the name, with a number if it is taken."""
-    found, number = name, 1
-    while found in taken:
-        number += 1
-        found = f"{name}_{number}"
-    return found
 
 
 def joint_paths(names: Sequence[str], parents: Ints) -> list[str]:

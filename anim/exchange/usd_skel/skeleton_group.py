@@ -6,19 +6,17 @@ are one skeleton if such a matrix exists, as for the clothes and the body of a c
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.errors import UnsupportedError
+from anim.exchange.usd_skel.bind_poses import BindPose, BindPoses
+from anim.exchange.usd_skel.joint_hierarchy import NodeOrder, join_joints
 from anim.model import MeshInstance, Scene, Skin
-from anim.model.skeleton import ancestors
 from anim.sampling.pose import rest_world
-
-BIND_TOLERANCE_PER_DIAGONAL = 1e-6  # of the mesh, to its corners: rounding of float32 matrices
-IDENTITY_TOLERANCE = 1e-6
 
 
 @dataclass(slots=True)
@@ -65,42 +63,58 @@ def group_skeletons(
     rest = rest_world(scene.skeleton)
     groups: list[SkeletonGroup] = []
     morphed: list[SkeletonGroup] = []
+    poses, order = BindPoses(), NodeOrder(scene.skeleton)
     for instance in instances:
         if instance.skin is None:
             if len(instance.mesh.targets):
                 morphed.append(SkeletonGroup(instance.node, members=[(instance, np.eye(4))]))
             continue
         binds = _inverse_binds(instance, instance.skin, scene, rest)
-        for group in groups:
-            matrix = _matrix_into(group, binds, instance.mesh.positions)
+        pose = BindPose(binds, instance.mesh.positions)
+        for number in poses.candidates(instance.skin):
+            group = groups[number]
+            matrix = pose.matrix_into(group.inverse_bind)
             if matrix is not None:
                 break
         else:
-            group, matrix = SkeletonGroup(-1), np.eye(4)
+            number, group, matrix = len(groups), SkeletonGroup(-1), np.eye(4)
             groups.append(group)
+        poses.add(instance.skin, number)
         to_skeleton = np.linalg.inv(matrix)
         group.inverse_bind |= {
             node: bind @ to_skeleton for node, bind in binds.items() if node not in group.inverse_bind
         }
         group.members.append((instance, matrix))
+    above = _groups_above(groups, order)
     for instance in instances:
-        if instance.skin is None and not len(instance.mesh.targets):
-            _add_attached(groups, instance, scene, rest)
+        first = above[instance.node]
+        if instance.skin is None and not len(instance.mesh.targets) and first is not None:
+            _add_attached(groups[first], instance, rest)
     for group in groups:
-        _join_hierarchy(group, scene, animated)
+        group.anchor, group.joints, group.parents = join_joints(group.inverse_bind, order, animated)
     return groups + morphed
 
 
-def _add_attached(groups: Sequence[SkeletonGroup], instance: MeshInstance, scene: Scene, rest: Floats) -> None:
-    """Add an unskinned instance to the skeleton with a joint above it, its node being a joint."""
-    above = list(ancestors(scene.skeleton.parents, instance.node))
-    for group in groups:
-        if any(node in group.inverse_bind for node in above):
-            world = _homogeneous(rest[instance.node])
-            if _are_invertible(world):
-                bind = group.inverse_bind.setdefault(instance.node, np.asarray(np.linalg.inv(world), np.float64))
-                group.members.append((instance, np.asarray(np.linalg.inv(bind), np.float64)))
-            return
+def _groups_above(groups: Sequence[SkeletonGroup], order: NodeOrder) -> list[int | None]:
+    """The number of the first skeleton with a joint above each node (N,), None for none."""
+    own: dict[int, int] = {}
+    for number, group in enumerate(groups):
+        for node in group.inverse_bind:
+            own.setdefault(node, number)
+    found: list[int | None] = [None] * len(order.nodes)
+    for node in order.nodes:
+        parent = order.parents[node]
+        if parent >= 0:
+            found[node] = min((each for each in (found[parent], own.get(parent)) if each is not None), default=None)
+    return found
+
+
+def _add_attached(group: SkeletonGroup, instance: MeshInstance, rest: Floats) -> None:
+    """Add an unskinned instance below a joint of a skeleton, its node being a joint."""
+    world = _homogeneous(rest[instance.node])
+    if _are_invertible(world):
+        bind = group.inverse_bind.setdefault(instance.node, np.asarray(np.linalg.inv(world), np.float64))
+        group.members.append((instance, np.asarray(np.linalg.inv(bind), np.float64)))
 
 
 def _inverse_binds(instance: MeshInstance, skin: Skin, scene: Scene, rest: Floats) -> dict[int, Floats]:
@@ -138,60 +152,3 @@ def _are_invertible(matrices: Floats) -> Bools:
     """Mask (...) of affine matrices (..., 3 or 4, 4) that have an inverse."""
     singular = np.linalg.svd(matrices[..., :3, :3], compute_uv=False)
     return np.asarray(np.isfinite(matrices).all(axis=(-2, -1)) & (singular[..., -1] > 1e-9 * singular[..., 0]))
-
-
-def _matrix_into(group: SkeletonGroup, binds: dict[int, Floats], positions: Floats) -> Floats | None:
-    """Mesh-to-skeleton (4, 4) for a skin in the bind pose of a group; None if there is none, or no common joint."""
-    common = [node for node in binds if node in group.inverse_bind]
-    if not common:
-        return None
-    matrix = np.linalg.inv(group.inverse_bind[common[0]]) @ binds[common[0]]
-    if np.abs(matrix - np.eye(4)).max() < IDENTITY_TOLERANCE:
-        matrix = np.eye(4)
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    corners = np.array([(x, y, z, 1) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    limit = BIND_TOLERANCE_PER_DIAGONAL * float(np.linalg.norm(high - low))
-    for node in common:
-        difference = np.linalg.inv(binds[node]) @ group.inverse_bind[node] @ matrix - np.eye(4)
-        if np.linalg.norm((corners @ difference.T)[:, :3], axis=1).max() > limit:
-            return None
-    return matrix
-
-
-def _join_hierarchy(group: SkeletonGroup, scene: Scene, animated: Container[int]) -> None:
-    """Set the anchor, above which nothing moves, and the joints with their parents from those with a bind."""
-    parents = scene.skeleton.parents
-    chains = {node: list(ancestors(parents, node)) for node in group.inverse_bind}
-    group.anchor = _common_ancestor(list(chains.values()), group.inverse_bind)
-    moving = [node for node in (group.anchor, *ancestors(parents, group.anchor)) if node >= 0 and node in animated]
-    if moving:
-        group.anchor = int(parents[moving[-1]])
-    inside = set(chains)
-    for chain in chains.values():
-        inside.update(chain[: chain.index(group.anchor)] if group.anchor >= 0 else chain)
-    order = [node for level in scene.skeleton.levels() for node in level.tolist() if node in inside]
-    group.joints = tuple(_depth_first(order, parents))
-    number = {node: i for i, node in enumerate(group.joints)}
-    group.parents = np.array([number.get(int(parents[node]), -1) for node in group.joints], np.int64)
-
-
-def _common_ancestor(chains: Sequence[Sequence[int]], joints: Iterable[int]) -> int:
-    """The nearest node above all joints that is no joint, −1 for none."""
-    own = set(joints)
-    common = set(chains[0]).intersection(*chains[1:]) - own
-    return next((node for node in chains[0] if node in common), -1)
-
-
-def _depth_first(order: Sequence[int], parents: Ints) -> list[int]:
-    """The nodes, given by level, so that each is followed by its descendants."""
-    children: dict[int, list[int]] = {}
-    inside = set(order)
-    for node in order:
-        parent = int(parents[node])
-        children.setdefault(parent if parent in inside else -1, []).append(node)
-    found, stack = [], children.get(-1, [])[::-1]
-    while stack:
-        node = stack.pop()
-        found.append(node)
-        stack.extend(reversed(children.get(node, ())))
-    return found

@@ -84,7 +84,7 @@ class SkeletonPrim:
             (self._animation.CreateScalesAttr(), samples.scale, Vt.Vec3hArray.FromNumpy),
         )
         for attribute, values, make in rows:
-            set_samples(attribute, [make(np.ascontiguousarray(row)) for row in values], self._codes, values)
+            set_samples(attribute, make, self._codes, np.ascontiguousarray(values))
 
 
 def _bind_transforms(group: SkeletonGroup, rest: PosedSkeleton, factors: Floats) -> tuple[Floats, float]:

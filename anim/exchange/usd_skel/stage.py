@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from anim.arrays import Floats
+from anim.caches.formats.usd_face_materials import face_materials
 from anim.caches.formats.usd_materials import UsdMaterials, bind_primitives
-from anim.caches.formats.usd_stage import MATERIALS, ROOT, SaveImage, set_metadata
+from anim.caches.formats.usd_stage import MATERIALS, ROOT, SaveImage, define_prims, set_metadata
 from anim.exchange.usd_skel import mesh_prims
 from anim.exchange.usd_skel.blend_weights import scale_targets
 from anim.exchange.usd_skel.node_prims import NodePrims
+from anim.exchange.usd_skel.prim_names import UniqueNames
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup, group_skeletons
 from anim.exchange.usd_skel.skeleton_prims import SkeletonPrim
+from anim.exchange.usd_skel.stage_layout import lay_out
 from anim.gltf.document import Document, Json
 from anim.model import Clip, MeshInstance, Scene
 from anim.model.track import NUM_COMPONENTS
@@ -50,6 +53,7 @@ class StageBuilder:
     def __init__(self, stage: Any, document: Document, scene: Scene, clip: Clip, times: StageTimes) -> None:
         self._stage, self._document, self._scene, self._times = stage, document, scene, times
         self._rest = PosedSkeleton.at_rest(scene.skeleton)
+        self._mirrored = np.linalg.det(self._rest.world[:, 0, :, :3]) < 0
         self._posed = PoseSampler(scene.skeleton, clip).posed(times.seconds)
         moving = [track for track in clip.tracks if track.path in NUM_COMPONENTS]
         self._animated = {track.node for track in moving if track.node is not None}
@@ -73,23 +77,31 @@ class StageBuilder:
         bound = {each.node for group in groups for each, _ in group.members}
         plain = [each for each in shown if each.node not in bound]
         self._nodes.add([*(each.node for each in plain), *(group.anchor for group in groups)])
+        self._layout = lay_out(self._scene.skeleton, self._nodes, plain, groups)
+        define_prims(stage, self._layout.prims)
+        self._materials.add_prims(
+            self._shown_materials([*plain, *(each for group in groups for each, _ in group.members)])
+        )
         for each in plain:
             self._mesh(each, each.node)
-        for group in groups:
-            self._skeleton(group)
+        for group, path in zip(groups, self._layout.skeletons, strict=True):
+            self._skeleton(group, path)
         if self._num_scaled:
             verb = "is" if self._num_scaled == 1 else "are"
             scaled = f"{plural(self._num_scaled, 'morph target')} {verb} scaled or split in two"
             note(f"{scaled}, for weights from 0 to 1, to which Blender clamps them")
 
-    def _skeleton(self, group: SkeletonGroup) -> None:
+    def _shown_materials(self, instances: Sequence[MeshInstance]) -> Iterator[int]:
+        for each in instances:
+            yield from face_materials(self._document.json, each.mesh.faces, self._primitives(each)).numbers
+
+    def _skeleton(self, group: SkeletonGroup, path: str) -> None:
         """Write a skeleton and its meshes, side by side."""
         from pxr import UsdSkel
 
-        path = self._nodes.names.child(self._nodes.path(group.anchor), "skeleton")
         made = SkeletonPrim(self._stage, path, group, self._rest, self._posed, self._times.codes)
         number = {node: i for i, node in enumerate(group.joints)}
-        names, weights, taken = list[str](), list[Floats](), set[str]()
+        names, weights, taken = list[str](), list[Floats](), UniqueNames()
         for instance, to_bind in group.members:
             to_skeleton = np.diag([made.bind_scale] * 3 + [1.0]) @ to_bind
             prim = self._mesh(instance, group.anchor)
@@ -111,12 +123,9 @@ class StageBuilder:
 
     def _mesh(self, instance: MeshInstance, parent: int) -> Any:
         """Write a mesh below the prim of a node, its faces reversed if only one of both nodes mirrors them."""
-        skeleton = self._scene.skeleton
-        name = skeleton.names[instance.node] if parent != instance.node else instance.mesh.name
-        path = self._nodes.names.child(self._nodes.path(parent), name or f"mesh{instance.node}")
         is_mirrored = self._is_mirrored(instance.node) != self._is_mirrored(parent)
         faces = instance.mesh.faces[:, ::-1] if is_mirrored else instance.mesh.faces
-        prim = mesh_prims.define_mesh(self._stage, path, instance.mesh, faces)
+        prim = mesh_prims.define_mesh(self._stage, self._layout.meshes[instance.node], instance.mesh, faces)
         primitives = self._primitives(instance)
         count = len(instance.mesh.positions)
         bind_primitives(self._document, prim, self._materials, count, instance.mesh.faces, primitives)
@@ -124,7 +133,7 @@ class StageBuilder:
         return prim
 
     def _is_mirrored(self, node: int) -> bool:
-        return node >= 0 and float(np.linalg.det(self._rest.world[node, 0, :, :3])) < 0
+        return node >= 0 and bool(self._mirrored[node])
 
     def _primitives(self, instance: MeshInstance) -> list[tuple[Json, tuple[int, int]]]:
         """The primitives with vertices, and their spans."""

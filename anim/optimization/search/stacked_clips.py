@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.point_rows import stack_points
@@ -19,6 +19,7 @@ from anim.optimization.search.playback import level_world_matrices, required_lev
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
 
 END_WEIGHT = 4.0  # weight of the first and the last time in fits: loops and cuts must stay continuous
+BLOCK_VALUES = 1 << 20  # of nodes, compared at a time: 8 MB
 
 
 class StackedClips:
@@ -59,7 +60,7 @@ class StackedClips:
         self.moving, self.row = np.unique(self.node, return_inverse=True)
         self.local = tuple(self._padded(sources, path, self.moving) for path in range(len(PATHS)))
         others = np.setdiff1d(np.concatenate(required_levels(skeleton, points.nodes) or [self.moving]), self.moving)
-        is_still = np.array([_is_constant(sources, node) for node in others.tolist()], np.bool_)
+        is_still = _are_constant(sources, others)
         self.varying, self.constant = others[~is_still], others[is_still]
         varying = [self._padded(sources, path, self.varying) for path in range(len(PATHS))]
         self.varying_rotation = varying[ROTATION]
@@ -145,11 +146,12 @@ def _rebind(
     return points, required_levels(skeleton, points.nodes)
 
 
-def _is_constant(sources: Sequence[SourceMotion], node: int) -> bool:
-    """Return whether a node's local transform is the same at all times of all clips."""
-    first = sources[0].local
-    return all(
-        bool((part[node] == start[node, 0]).all())
-        for source in sources
-        for part, start in zip(source.local, first, strict=True)
-    )
+def _are_constant(sources: Sequence[SourceMotion], nodes: Ints) -> Bools:
+    """Mask (n,) of nodes whose local transform is the same at all times of all clips."""
+    found: Bools = np.ones(len(nodes), np.bool_)
+    for part, start in ((part, sources[0].local[i]) for each in sources for i, part in enumerate(each.local)):
+        step = max(BLOCK_VALUES // max(part[0].size, 1), 1) if len(part) else 1
+        for first in range(0, len(nodes), step):
+            some = nodes[first : first + step]
+            found[first : first + step] &= (part[some] == start[some, :1]).all(axis=(1, 2))
+    return found

@@ -15,6 +15,7 @@ from anim.gltf.writing.append import Contents, append_accessors, append_nodes, m
 from anim.model import Mesh, Skeleton, Skin
 
 MAX_JOINTS_OF_BYTES = 256
+MAX_MESHES = 100  # which three.js draws one by one; it takes skins without a common root too
 ATTRIBUTES = ("indices", "POSITION", "NORMAL", "JOINTS_0", "WEIGHTS_0", "inverseBindMatrices")  # of each mesh, in order
 MATERIAL: Json = {
     "name": "sticks",
@@ -27,7 +28,7 @@ def add_sticks(document: Document) -> Document:
     skeleton = reader.skeleton(document)
     if len(skeleton) < 2:
         return document
-    split = split_by_root(skeleton, *stick_mesh(skeleton, _ends(skeleton)))
+    split = split_by_root(skeleton, *stick_mesh(skeleton, _ends(skeleton)), max_meshes=MAX_MESHES)
     bodies = [(mesh, skin) for mesh, skin in split if len(mesh.positions)]
     if not bodies:
         return document

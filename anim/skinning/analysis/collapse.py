@@ -89,7 +89,7 @@ class Comparison:
             for method in methods
         }
         self._linear = self._bakers.get("lbs") or prepare_bake(scene, nodes=looked_at)
-        self._subjects = [bind_measures(layer, rest) for layer in next(iter(self._bakers.values())).bind_each()]
+        self._subjects = bind_measures(next(iter(self._bakers.values())).bind_each(), rest)
         self.meshes = len(self._instances)
 
     def of(self, clip: Clip, *, times: Floats) -> tuple[MeshCollapse, ...]:

@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from anim.arrays import AnyArray, Bools, Floats, Ints
+
+
+def watertight_faces_of_all(shapes: Sequence[tuple[Floats, Ints]]) -> list[Bools]:
+    """Return the faces of closed parts of many shapes, (V, 3) points and (T, 3) faces each; of equal ones once."""
+    found: dict[tuple[bytes, bytes], Bools] = {}
+    masks = []
+    for points, faces in shapes:
+        key = points.tobytes(), faces.tobytes()
+        if key not in found:
+            found[key] = watertight_faces(points, faces) if len(faces) else np.zeros(0, bool)
+        masks.append(found[key])
+    return masks
 
 
 def watertight_faces(points: Floats, faces: Ints) -> Bools:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats, Ints
+from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.maths.hierarchy import subtree_sums
 from anim.model import Clip, FrameChunk, Skeleton
 from anim.sampling.pose import PosedSkeleton, PoseSampler
-from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces
+from anim.skinning.analysis.enclosed_volume import volumes, watertight_faces_of_all
 from anim.skinning.analysis.method_deviation import max_distance, model_size
 from anim.skinning.bake import Baker
 from anim.skinning.binding import SkinBinding
@@ -60,10 +60,15 @@ class BindMeasures:
     watched: Ints
 
 
-def bind_measures(layer: BoundMesh, rest: PosedSkeleton) -> BindMeasures:
-    """Return the measures of a mesh in bind pose. rest: its skeleton in the rest pose."""
+def bind_measures(layers: Sequence[BoundMesh], rest: PosedSkeleton) -> list[BindMeasures]:
+    """Return the measures of meshes in bind pose. rest: their skeleton in the rest pose."""
+    closed = watertight_faces_of_all([(each.rig.points, each.rig.faces) for each in layers])
+    return [_bind_measures(layer, own, rest) for layer, own in zip(layers, closed, strict=True)]
+
+
+def _bind_measures(layer: BoundMesh, closed: Bools, rest: PosedSkeleton) -> BindMeasures:
     rig = layer.rig
-    faces = rig.faces[watertight_faces(rig.points, rig.faces)] if len(rig.faces) else rig.faces
+    faces = rig.faces[closed]
     volume = float(volumes(rig.points[None], faces)[0]) if len(faces) else 0.0
     volume *= np.sign(_common_volume(rig, layer.matrices(rest, slice(None)))[0])
     of = bone_segments(rig)
@@ -89,10 +94,11 @@ def score_methods(
             matrices = subject.layer.matrices(frames, slice(None))
             for each, chunk in zip(extremes, chunks, strict=True):
                 each.add(chunk, straight, matrices)
+    sizes = {method: model_size(baker) for method, baker in bakers.items()}
     for extremes in seen:
         yield tuple(
-            each.score(method, skeleton, times, model_size(baker))
-            for each, (method, baker) in zip(extremes, bakers.items(), strict=True)
+            each.score(method, skeleton, times, size)
+            for each, (method, size) in zip(extremes, sizes.items(), strict=True)
         )
 
 

@@ -9,6 +9,7 @@ from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf import authoring
 from anim.gltf.reading import reader
 from anim.model import Skeleton
+from tests.clips import skeleton
 from tests.files import glb_of, opened
 
 # A turned arm with a forearm that has no length, a hand, and an End Site.
@@ -79,3 +80,14 @@ def test_each_tree_gets_a_body_of_its_own() -> None:
 def test_a_single_joint_shows_too() -> None:
     point = Skeleton(("a",), np.array([-1]), np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.ones((1, 3)))
     assert len(stick_mesh(point)[0].faces) == 8
+
+
+def test_trees_beyond_a_number_of_meshes_share_one() -> None:
+    trees = skeleton([-1] * 7, translation=np.eye(7, 3))
+    whole, skin = stick_mesh(trees)
+    bodies = split_by_root(trees, whole, skin, max_meshes=3)
+    assert [each.joints.tolist() for _, each in bodies] == [[0, 1, 2], [3, 4, 5], [6]]
+    np.testing.assert_array_equal(np.concatenate([mesh.positions for mesh, _ in bodies]), whole.positions)
+    owners = [own.joints[mesh.joints[:, 0]] for mesh, own in bodies]
+    np.testing.assert_array_equal(np.concatenate(owners), skin.joints[whole.joints[:, 0]])
+    assert [len(split_by_root(trees, whole, skin, max_meshes=count)) for count in (1, 7, 9)] == [1, 7, 7]

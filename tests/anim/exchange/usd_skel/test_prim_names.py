@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anim.exchange.usd_skel.prim_names import PrimNames, valid
+from anim.exchange.usd_skel.prim_names import PrimNames, UniqueNames, valid
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
@@ -24,3 +24,9 @@ def test_weapons_for_one_hand_and_for_two() -> None:
         "/root/_2H_Sword",
         "/root/_1H_Sword_2",
     ]
+
+
+def test_names_of_many_equal_ones_go_on_from_the_last() -> None:
+    names = UniqueNames(["arm_3"])
+    assert [names.add("arm") for _ in range(4)] == ["arm", "arm_2", "arm_4", "arm_5"]
+    assert names.add("arm_2") == "arm_2_2"

@@ -13,6 +13,7 @@ from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.point_rows import stack_points
 from anim.model import Clip, Scene
+from anim.optimization.search import stacked_clips
 from anim.optimization.search.source_motion import PATHS
 from anim.optimization.search.stacked_clips import END_WEIGHT, StackedClips
 from anim.sampling import sample_pose, world_matrices
@@ -145,3 +146,16 @@ def test_chords_are_normalized_mixes() -> None:
     assert stacked.at[0, quarter] == 0.25
     assert x_axis[quarter] == pytest.approx(Rotation.from_quat(mix).as_matrix()[:, 0])
     assert stacked.columns[0, :, 0].T[quarter] == pytest.approx([np.cos(np.radians(30)), 0.5, 0])
+
+
+@pytest.mark.parametrize("block", [1, 40, 1 << 20])
+def test_nodes_that_stay_are_found_in_blocks(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = stack(*CLIPS)
+    monkeypatch.setattr(stacked_clips, "BLOCK_VALUES", block)
+    found = stack(*CLIPS)
+    for name in ("constant", "varying", "constant_matrices"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+    first = whole.sources[0].local
+    for node in [*found.constant.tolist(), *found.varying.tolist()]:
+        parts = [(part[node], first[i][node, 0]) for each in found.sources for i, part in enumerate(each.local)]
+        assert (node in found.constant) == all((values == start).all() for values, start in parts)

@@ -16,10 +16,10 @@ from anim.gltf.io import json_text
 from anim.gltf.reading import reader
 from anim.gltf.writing import draco_decoding, writer
 from anim.operations.resample import resample
-from anim.show.page import embedding
+from anim.show.page import embedding, sticks
 from anim.show.page.embedding import embed
 from anim.skinning.bake import bake
-from tests import draco
+from tests import draco, many
 from tests.anim.show.page.embedded import MARKUP, content_of, edited
 from tests.files import opened, opened_fixture, opened_path
 from tests.judge import judge, needs_judge, vertices
@@ -272,3 +272,23 @@ def test_what_three_fails_on_is_left_out() -> None:
     assert "name" not in content["scenes"][0]
     assert "material" not in content["meshes"][0]["primitives"][0]
     assert content["extensionsUsed"] == ["KHR_materials_unlit"]
+
+
+def test_many_trees_without_a_mesh_become_few_meshes() -> None:
+    found = content_of(embed(opened(many.side(250))).glb)
+    assert len(found["meshes"]) == 84  # of three nodes each
+    assert sorted(joint for skin in found["skins"] for joint in skin["joints"]) == list(range(250))
+
+
+@needs_judge
+def test_three_skins_meshes_on_several_trees(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Skins whose joints have no common root, which glTF does not allow."""
+    made = []
+    for count in (2, 10):
+        monkeypatch.setattr(sticks, "MAX_MESHES", count)
+        path = tmp_path / f"{count}.glb"
+        path.write_bytes(embed(opened(many.side_moving(10))).glb)
+        assert len(content_of(path.read_bytes())["meshes"]) == count
+        made.append(vertices(path, clip=0, time=0.25))
+    np.testing.assert_allclose(made[0], made[1], rtol=0, atol=1e-7)
+    assert len(made[0]) == 10 * 24
