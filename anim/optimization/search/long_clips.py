@@ -24,7 +24,7 @@ from anim.optimization.tracks.quantization import EncodedKeys, Encoding
 
 MAX_WHOLE_MATRICES = 80_000  # possible key times × nodes of a clip that is searched at once, in about 120 MB
 PART_MATRICES = 40_000
-MIN_PART_KEYS = 256
+MIN_PART_KEYS = 128
 
 
 class _PartKeys(NamedTuple):

@@ -20,7 +20,7 @@ from tests.cli.running import built
         ("/dev/stdout", 1),
         ("//dev/stderr", 2),
         ("/dev/../dev/./fd/3", 3),
-        (f"/proc/{os.getpid()}/fd/12", 12),
+        ("/proc/{pid}/fd/12", 12),
         ("/proc/thread-self/fd/1", 1),
         ("/dev/null", None),
         ("/dev/stdin", 0),
@@ -29,7 +29,7 @@ from tests.cli.running import built
     ],
 )
 def test_every_name_of_an_open_file_is_known(path: str, number: int | None) -> None:
-    assert descriptor_of(Path(path)) == number
+    assert descriptor_of(Path(path.format(pid=os.getpid()))) == number
 
 
 def test_links_to_an_open_file_are_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
