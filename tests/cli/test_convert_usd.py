@@ -11,6 +11,7 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.gltf.writing import writer
+from tests import many
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import help_line, refusal, stated_length
 from tests.files import glb_of, opened_path
@@ -155,3 +156,12 @@ def test_a_dry_run_writes_nothing(call: Call, fixture: Fixture, tmp_path: Path) 
     assert run.code == 0
     assert "(dry run: nothing written)" in run.err
     assert not (tmp_path / "a.usdz").exists()
+
+
+def test_a_deep_hierarchy_is_refused_before_usd_takes_minutes_for_it(call: Call, tmp_path: Path) -> None:
+    path, out = tmp_path / "deep.glb", tmp_path / "out.usdc"
+    for count, expected in ((1000, 0), (1001, 4), (10_000, 4)):
+        path.write_bytes(many.chain_mesh(count))
+        run = call("convert", path, out)
+        assert run.code == expected
+        assert expected == 0 or f"meshes hang on {count} levels of nodes" in run.err

@@ -9,11 +9,13 @@ import numpy as np
 
 from anim.arrays import AnyArray, Floats
 from anim.caches.formats.usd_stage import ROOT, define_prims
+from anim.errors import UnsupportedError
 from anim.exchange.usd_skel.prim_names import PrimNames
 from anim.maths import quaternion
 from anim.model.skeleton import ancestors
 from anim.sampling.pose import PosedSkeleton
 
+MAX_LEVELS = 1000  # of prims: usd-core takes seconds to save them, a minute for 4000 levels, and so on with their cube
 IDENTITY = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 
@@ -29,7 +31,10 @@ class NodePrims:
         self.names = PrimNames()
 
     def add(self, nodes: Iterable[int]) -> None:
-        """Make the prims of nodes and those above them, siblings in the order of the file."""
+        """Make the prims of nodes and those above them, siblings in the order of the file.
+
+        Raises UnsupportedError for more than MAX_LEVELS levels.
+        """
         skeleton = self._rest.skeleton
         wanted = set[int]()
         for node in nodes:
@@ -38,7 +43,10 @@ class NodePrims:
                     break
                 wanted.add(each)
         wanted -= self._paths.keys()
-        new = [node for level in skeleton.levels() for node in level.tolist() if node in wanted]
+        levels = [[node for node in level.tolist() if node in wanted] for level in skeleton.levels()]
+        if (depth := sum(map(bool, levels))) > MAX_LEVELS:
+            raise UnsupportedError(f"meshes hang on {depth} levels of nodes (USD is written with up to {MAX_LEVELS})")
+        new = [node for level in levels for node in level]
         for node in new:
             parent = self.path(int(skeleton.parents[node]))
             self._paths[node] = self.names.child(parent, skeleton.names[node] or f"node{node}")
