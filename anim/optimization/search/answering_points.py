@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import AnyArray, Floats, Ints
 from anim.maths.hierarchy import find_subtrees
 from anim.measure.error.point_matrix import CARRIED, PointMatrix
 
@@ -44,7 +44,7 @@ class AnsweringPoints:
             self._cached[node] = found
         return found
 
-    def radii(self, places: Floats, nodes: Sequence[int], centers: Floats) -> Floats:
+    def radii(self, places: AnyArray, nodes: Sequence[int], centers: AnyArray) -> Floats:
         """Return the largest distance of the points (P, 3, F) of each node (M,) from places of its own (M, 3, F), in m.
 
         0 without points.
@@ -80,14 +80,14 @@ class AnsweringPoints:
         return np.asarray(near[share > CARRIED if (share > CARRIED).any() else share > 0])
 
 
-def _farthest(places: Floats, center: Floats) -> float:
+def _farthest(places: AnyArray, center: AnyArray) -> float:
     """The largest squared distance of places (V, 3, F) from one (3, F); 0 without any."""
     away = places - center
     away *= away
     return float((away[:, 0] + away[:, 1] + away[:, 2]).max(initial=0.0))
 
 
-def _farthest_in_ranges(places: Floats, starts: Ints, ends: Ints, centers: Floats) -> Floats:
+def _farthest_in_ranges(places: AnyArray, starts: Ints, ends: Ints, centers: AnyArray) -> Floats:
     """The largest squared distance (M,) of each range of places (P, 3, F) from one of M places (3, F).
 
     Blocks of places are only looked into if a corner of their box is farther than what was found.

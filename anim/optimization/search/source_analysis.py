@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
+from anim.measure.error.point_rows import stack_points
 from anim.model import Clip, Interpolation, Skeleton, Track
 from anim.optimization.options import Reference
 from anim.optimization.search import playback
@@ -192,13 +193,14 @@ def _moment_arms(
     points: PointMatrix,
     answering: AnsweringPoints,
 ) -> _Arms:
-    radius = np.zeros((len(asked), len(skeleton)))
+    radius, rows = np.zeros((len(asked), len(skeleton))), points.rows()
     for n, each in enumerate(asked):
         length = local.lengths[n]
         frames = world[:, n, : length : max(1, -(-length // PROBE_FRAMES))]
         nodes = sorted({track.node for track in _tracks_of(each) if track.node is not None})
-        places = np.swapaxes(points.places(frames), 1, 2)  # (P, 3, F)
-        radius[n, nodes] = answering.radii(places, nodes, np.swapaxes(frames[nodes, :, :, 3], 1, 2))
+        places = rows.moves(stack_points(frames, points.nodes))  # (P, 3, F), in float32: moment arms only weigh budgets
+        centers = np.swapaxes(frames[nodes, :, :, 3], 1, 2).astype(np.float32)
+        radius[n, nodes] = answering.radii(places, nodes, centers)
     return _Arms(radius, _widening(skeleton, world, np.concatenate(levels)))
 
 
