@@ -10,7 +10,7 @@ from anim.arrays import Ints
 from anim.optimization.search.axis_merging import SharedAxis
 from anim.optimization.search.plan import TrackAction
 from anim.optimization.search.source_motion import PATHS, SourceMotion
-from anim.optimization.tracks.quantization import MAX_INT16, EncodedKeys, Encoding
+from anim.optimization.tracks.quantization import MAX_INT16, EncodedKeys, Encoding, storage_level
 
 INT16_STEP = 1 / MAX_INT16
 SIMILARITY_PROBES = 8  # number of times at which tracks are compared before they are at all times
@@ -45,7 +45,7 @@ class SizeEstimate:
 
     def storage_level(self, track: int, tolerance: float) -> int:
         """Return a number that is equal for tolerances with which the keys of a track are stored equally."""
-        return self._coding.storage_level(self._paths[track], tolerance)
+        return storage_level(self._paths[track], tolerance, self._coding.packing)
 
     def _overhead(self, actions: Ints, axes: Sequence[SharedAxis], num_moving: int) -> float:
         """Bytes of JSON and of time axes, if `num_moving` tracks have keys of their own."""

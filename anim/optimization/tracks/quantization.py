@@ -84,14 +84,6 @@ class Encoding:
             return 0.0
         return count * (4 * 2 if is_int16(path, tolerance, count) else 4 * NUM_COMPONENTS[path])
 
-    def storage_level(self, path: str, tolerance: float) -> int:
-        """Return a number that is equal for tolerances with which `choose_format` chooses equally for any keys."""
-        if self.packing is Packing.CORE:
-            return int(tolerance >= MIN_INT16_ERROR)
-        if path == "rotation" and tolerance >= MIN_FILTER_ERROR:
-            return MAX_EXPONENT + filter_bits(tolerance)
-        return _tolerated_exponent(tolerance)
-
 
 @dataclass(frozen=True, slots=True)
 class EncodedKeys:
@@ -131,6 +123,15 @@ def choose_format(values: Floats, path: str, tolerance: float, packing: Packing)
     if path == "rotation" and tolerance >= MIN_FILTER_ERROR:
         return "quaternion", filter_bits(tolerance)
     return "exponent", exponent(values, tolerance)
+
+
+def storage_level(path: str, tolerance: float, packing: Packing) -> int:
+    """Return a number that is equal for tolerances with which `choose_format` chooses equally for any keys."""
+    if packing is Packing.CORE:
+        return int(tolerance >= MIN_INT16_ERROR)
+    if path == "rotation" and tolerance >= MIN_FILTER_ERROR:
+        return MAX_EXPONENT + filter_bits(tolerance)
+    return _tolerated_exponent(tolerance)
 
 
 def is_int16(path: str, tolerance: float, count: int) -> bool:

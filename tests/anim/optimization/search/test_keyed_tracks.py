@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -124,6 +125,41 @@ def test_clips_that_are_not_asked_for_have_no_tracks() -> None:
     keyed = KeyedTracks(STACKED, Packing.CORE)
     tracks = np.concatenate([made.tracks for made in _made(keyed, _axes(keyed, THIRDS, (0, 2)))])
     assert set(STACKED.clip[tracks].tolist()) == {0, 2}
+
+
+@pytest.mark.parametrize("packing", list(Packing))
+def test_keys_of_an_earlier_trial_are_made_once(packing: Packing, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of equal axes and storage; on another axis, or stored otherwise, tracks are made again."""
+    keyed, fresh = KeyedTracks(STACKED, packing), KeyedTracks(STACKED, packing)
+    made: list[int] = []
+    make = KeyedTracks._make
+
+    def counted(self: KeyedTracks, tracks: Ints, *more: Any) -> Any:
+        made.extend(tracks.tolist() if self is keyed else [])
+        return make(self, tracks, *more)
+
+    monkeypatch.setattr(KeyedTracks, "_make", counted)
+    expected_calls = []
+    for masks, tolerance in ((THIRDS, 1e-3), (THIRDS, 1e-3), (MIXED, 1e-3), (THIRDS, 1.1e-3), (THIRDS, 1e-9)):
+        found, expected = (_made(each, _axes(each, masks), tolerance) for each in (keyed, fresh))
+        fresh = KeyedTracks(STACKED, packing)
+        expected_calls.append(len(made))
+        made.clear()
+        for a, b in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(a.shown, b.shown)
+            assert [(each.form, each.codes) for each in a.stored] == [(each.form, each.codes) for each in b.stored]
+    assert expected_calls[:4] == [8, 0, 4, 0]
+    assert expected_calls[4] > 0
+
+
+def test_keys_of_earlier_trials_take_no_more_memory_than_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(keyed_tracks, "MAX_KNOWN_VALUES", 100)
+    keyed = KeyedTracks(STACKED, Packing.CORE)
+    first = _made(keyed, _axes(keyed, THIRDS))
+    second = _made(keyed, _axes(keyed, THIRDS))
+    assert sum(each.values.size for each in keyed._known.values()) < 400
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a.shown, b.shown)
 
 
 def test_many_tracks_are_made_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:

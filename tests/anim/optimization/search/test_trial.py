@@ -144,7 +144,7 @@ def test_results_that_are_not_smaller_have_no_keys(
     runner = bench(clip(*tracks, track("translation", times, np.sin(times[:, None] * [1, 2, 3]), node=1)))
     plan = runner.plan(0, budget)
     full = runner.run(plan)
-    asked = count_calls(monkeypatch, KeyedTracks, "store")
+    asked = count_calls(monkeypatch, KeyedTracks, "each")
     assert runner.attempt(plan, limit=full.size) is None
     assert bool(asked) == (apart == 1e-6 and budget < 1e-6)  # two in float32, which may have become one
     assert runner.attempt(plan, limit=full.size + 1) is not None

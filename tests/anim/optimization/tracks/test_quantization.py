@@ -102,7 +102,7 @@ def test_compressed_forms(path: str, miss: float, expected: str) -> None:
 @pytest.mark.parametrize("path", ["rotation", "translation"])
 def test_equal_storage_levels_are_equal_forms(path: str, packing: Packing) -> None:
     tolerances = [0.0, *np.geomspace(1e-12, 1e3, 400).tolist()]
-    levels = [_coding(packing).storage_level(path, each) for each in tolerances]
+    levels = [quantization.storage_level(path, each, packing) for each in tolerances]
     forms: dict[int, set[quantization.Form]] = {}
     for scale in (1e-3, 1, 1e3):
         for level, tolerance in zip(levels, tolerances, strict=True):
