@@ -23,6 +23,7 @@ HARMLESS = frozenset(
 )
 
 _CONTAINERS = (dict, list)  # of JSON
+_SCALARS = frozenset({str, int, float, bool, type(None)})  # a lookup is half as long as isinstance
 _Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its parent's, and its key or index there
 
 
@@ -139,7 +140,7 @@ def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str
     This goes through all of a file's JSON, up to 100 000 objects: pointers are only written out where one is needed.
     """
     for key, item in enumerate(value) if isinstance(value, list) else value.items():
-        if not isinstance(item, _CONTAINERS) or not item or key == "extras":
+        if type(item) in _SCALARS or not item or key == "extras":
             continue
         if key == "extensions" and isinstance(item, dict):
             for name, extension in item.items():
@@ -147,7 +148,7 @@ def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str
                     found.append((_pointer(((path, key), name)), extension))
                 elif isinstance(extension, _CONTAINERS):
                     _collect_unknown(extension, ((path, key), name), found)
-        else:
+        elif isinstance(item, _CONTAINERS):
             _collect_unknown(item, (path, key), found)
 
 
