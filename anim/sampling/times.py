@@ -20,7 +20,9 @@ MIN_INTERVAL_FRAMES = (
 MAX_FRAMES = 10_000_000
 MAX_MOVED_STEPS = 2  # float32 steps that a key may be moved by to differ from its neighbor
 FEWER_FRAMES = "choose a lower `fps`, or shorten the motion with gltf-anim trim"
-SHORTER_CLIP = "shorten the clip with gltf-anim trim, or choose others with `clip`"  # where the rate is no option
+SHORTER_CLIP = (  # where the rate is no option, and time before the first key counts
+    "shorten the clip with gltf-anim trim, which also moves a late start to 0 s, or choose others with `clip`"
+)
 FLOAT32_SPACING = 2.0**-23  # relative distance of neighboring float32 numbers
 MIN_JUMP_S = 1e-6  # s; shortest time between two keys that represent a jump, to avoid denormal times near 0 s
 MAX_JUMP_S = 1.5e-6  # s; with two float32 steps, the longest time between two keys that represent a jump

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from anim.errors import AnimError
 from anim.gltf.reading import reader
 from anim.operations.selection import Selection
 from anim.show.page.page import EMPTY, SHOWS, START_VIEW, PageFile, PageView, page
@@ -102,9 +103,12 @@ def _view(
 ) -> PageView:
     """View of the page when it opens: on the first clip and node that match."""
     selection = Selection(tuple(clip or ()), tuple(node or ()))
-    clips, skeleton = reader.names(file.document), reader.skeleton(file.document)
-    chosen_clip = reader.clip_name(clips[i], i) if clip and (i := selection.chosen_clips(clips)[0]) >= 0 else None
-    chosen_node = f"#{selection.chosen_nodes(skeleton)[0]}" if node else None
+    try:
+        clips, skeleton = reader.names(file.document), reader.skeleton(file.document)
+        chosen_clip = reader.clip_name(clips[i], i) if clip and (i := selection.chosen_clips(clips)[0]) >= 0 else None
+        chosen_node = f"#{selection.chosen_nodes(skeleton)[0]}" if node else None
+    except AnimError as error:
+        raise error.at(file.name, ": ") from None
     if chosen_node is not None and not shows:
         shows = ("curves",)
     return PageView(chosen_clip, chosen_node, at, shows)

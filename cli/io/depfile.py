@@ -54,17 +54,25 @@ def rule(outputs: Sequence[str], inputs: Sequence[str]) -> str:
 
 
 def escape(path: str) -> str:
-    """Return a path with spaces, # and $ escaped, as compilers do."""
+    """Return a path with spaces, #, $ and colons, but for that of a drive, escaped, as compilers do.
+
+    A line break can't be escaped.
+    """
     words = []
     for i, character in enumerate(path):
         if character in " \t":  # make takes backslashes before a space as escapes of each other
             words.append("\\" * (_backslashes_before(path, i) + 1))
-        elif character == "#":
+        elif character == "#" or (character == ":" and not _is_drive(path, i)):
             words.append("\\")
         elif character == "$":
             words.append("$")
         words.append(character)
     return "".join(words)
+
+
+def _is_drive(path: str, colon: int) -> bool:
+    """Tell whether the colon ends the name of a drive: "C:\\x.glb"."""
+    return colon == 1 and path[0].isalpha() and path[2:3] in ("/", "\\")
 
 
 def _backslashes_before(path: str, end: int) -> int:

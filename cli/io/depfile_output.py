@@ -23,6 +23,8 @@ def check(path: str, output: str, values: Iterable[Any]) -> None:
     """
     if output in ("", documents.PIPE):
         raise UsageError("--depfile needs an output file: name OUT")
+    if path == documents.PIPE:
+        raise UsageError("--depfile is '-' (expected a file name)", help="/dev/stdout writes the rule to stdout")
     documents.check_file(path)
     if _is_same(path, output):
         raise UsageError(f"{path}: --depfile would replace OUT (expected another file)")
@@ -58,7 +60,11 @@ def invoke(command: Callable[[], Any], path: str, output: str, *, dry_run: bool)
 def _rule(path: str, output: str, record: depfile.FileRecord) -> str:
     _refuse_inputs(path, record.inputs)
     outputs = list(record.outputs) if "{" in output else [output]
-    return depfile.rule(outputs or [output], list(record.inputs))
+    inputs = list(record.inputs)
+    for name in (*outputs, output, *inputs):
+        if "\n" in name or "\r" in name:
+            raise UsageError(f"{name!r}: a rule of --depfile can't hold a name with a line break")
+    return depfile.rule(outputs or [output], inputs)
 
 
 def _refuse_inputs(path: str, names: Iterable[Any]) -> None:

@@ -36,7 +36,7 @@ def check_placeholders(output: str, known: Sequence[str] = ()) -> None:
             expected = " or ".join(f"{{{each}}}" for each in known)
             raise UsageError(
                 f"{output}: {{{name}}} stands for nothing (expected {expected or 'a name without { }'})",
-                help="" if known else "only bake writes a file per {clip} and {mesh}",
+                help="" if known else "bake writes a file per {clip} and {mesh}, convert to USD one per {clip}",
             )
 
 

@@ -24,8 +24,8 @@ def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: s
     clip: name of the first file's clip that a bake or a cache is of.
     """
     try:
-        old, new = (read_scene(each.document, each.name, reporter) for each in (one, other))
-        clips = reader.clips(one.document), reader.clips(other.document)
+        (old, old_clips), (new, new_clips) = _read(one, reporter), _read(other, reporter)
+        clips = old_clips, new_clips
         is_cached = one.cache is not None or other.cache is not None
         counts = len(clips[0]), len(clips[1])
         if is_cached or is_bake_of(old, new, counts[1]) or is_bake_of(new, old, counts[0]):
@@ -42,6 +42,14 @@ def compare_files(one: PageFile, other: PageFile, reporter: Reporter, *, clip: s
     except AnimError as error:
         reporter.info(f"note: without errors over time: {error}")
         return EMPTY
+
+
+def _read(file: PageFile, reporter: Reporter) -> tuple[Scene, tuple[Clip, ...]]:
+    """Scene and clips of a file; errors name it."""
+    try:
+        return read_scene(file.document, file.name, reporter), reader.clips(file.document)
+    except AnimError as error:
+        raise error.at(file.name, ": ") from None
 
 
 def describe_worst(file: PageFile, content: PageContent) -> str:

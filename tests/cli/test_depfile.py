@@ -36,7 +36,16 @@ def rule(output: str, *inputs: str) -> str:
 
 @pytest.mark.parametrize(
     ("path", "escaped"),
-    [("a b.glb", r"a\ b.glb"), ("#1 $2.glb", r"\#1\ $$2.glb"), ("a\\ b", "a\\\\\\ b"), ("C:\\x.glb", "C:\\x.glb")],
+    [
+        ("a b.glb", r"a\ b.glb"),
+        ("#1 $2.glb", r"\#1\ $$2.glb"),
+        ("a\\ b", "a\\\\\\ b"),
+        ("C:\\x.glb", "C:\\x.glb"),
+        ("a:b.glb", r"a\:b.glb"),
+        ("a:/b.glb", "a:/b.glb"),
+        ("ab:/c.glb", r"ab\:/c.glb"),
+        (":", r"\:"),
+    ],
 )
 def test_names_are_escaped_as_by_compilers(path: str, escaped: str) -> None:
     assert depfile.escape(path) == escaped
@@ -74,6 +83,7 @@ def test_outputs_with_placeholders_are_all_named(folder: Path, call: Call) -> No
     [
         ("-", ["--depfile", "x.d"], "--depfile needs an output file: name OUT"),
         ("out.glb", ["--depfile", "out.glb"], "out.glb: --depfile would replace OUT (expected another file)"),
+        ("out.glb", ["--depfile", "-"], "--depfile is '-' (expected a file name)"),
         ("out.glb", ["--depfile", "none/x.d"], "none/x.d: there is no folder 'none'"),
     ],
 )
@@ -138,6 +148,16 @@ def test_an_input_is_not_replaced(folder: Path, call: Call) -> None:
     assert not (folder / "out.glb").exists()
 
 
+def test_a_name_that_a_rule_cannot_hold_is_refused(folder: Path, call: Call) -> None:
+    """A line break would be read as the start of another rule."""
+    (folder / "new\nline.glb").write_bytes(built("noop"))
+    for files in (("new\nline.glb", "out.glb"), ("noop.glb", "out\nput.glb")):
+        before = sorted(folder.iterdir())
+        run = call("retime", *files, "--speed", "2", "--depfile", "x.d")
+        assert "can't hold a name with a line break" in refusal(run, 2)
+        assert sorted(folder.iterdir()) == before
+
+
 def test_none_is_written_without_an_output(folder: Path, call: Call) -> None:
     assert call("retime", "noop.glb", "out.glb", "--speed", "2", "--depfile", "x.d", "--dry-run").code == 0
     assert call("trim", "none.glb", "out.glb", "--to", "0.5", "--depfile", "x.d").code == 3
@@ -179,6 +199,18 @@ def test_make_goes_on_when_an_input_is_gone(folder: Path) -> None:
     (folder / "noop.glb").rename("walk.glb")
     Path("Makefile").write_text(Path("Makefile").read_text().replace("noop.glb", "walk.glb"))
     assert "walk.glb" in _built("make")
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_reads_a_rule_of_names_with_colons(folder: Path) -> None:
+    """A colon without a backslash ends with "target pattern contains no '%'"."""
+    (folder / "noop.glb").rename("walk:1.glb")
+    line = "gltf-anim convert walk:1.glb out.glb --depfile out.d"
+    Path("Makefile").write_text(f"out.glb:\n\t{line}\n-include out.d\n")
+    _built("make")
+    assert "up to date" in _built("make")
+    _change(Path("walk:1.glb"))
+    assert "gltf-anim convert" in _built("make")
 
 
 @pytest.mark.skipif(shutil.which("ninja") is None, reason="ninja is not installed")

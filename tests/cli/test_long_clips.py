@@ -80,6 +80,20 @@ def test_clips_of_months_are_refused_alike(line: str, out: str, advice: str, cal
     assert list(tmp_path.iterdir()) == [endless]
 
 
+@pytest.mark.parametrize("command", ["resample --fps 30", "optimize"])
+def test_a_short_clip_that_starts_after_months_is_told_to_start_at_0(command: str, call: Call, tmp_path: Path) -> None:
+    """Players show its first pose until then, so that this time counts: to shorten the clip does not help."""
+    late, out = tmp_path / "late.glb", tmp_path / "out.glb"
+    late.write_bytes(built("tube"))
+    call("retime", late, late, "--offset", "1e6", "--clip", "#0").product()
+    name, *options = command.split()
+    run = call(name, late, out, *options, "--clip", "#0")
+    refusal(run, 4)
+    assert "trim, which also moves a late start to 0 s" in help_line(run)
+    call("trim", late, late, "--rebase", "--clip", "#0").product()
+    call(name, late, out, *options, "--clip", "#0").product()
+
+
 def test_a_number_of_pictures_has_its_own_limit(long: Path, call: Call, tmp_path: Path) -> None:
     run = call("render", long, tmp_path / "out.gif", "--clip", "#0")
     assert "frames at 24 fps (limit 3000)" in refusal(run, 4)

@@ -210,6 +210,9 @@ def test_inputs_that_cannot_be_read_are_3(call: Call, tmp_path: Path) -> None:
 
 def test_other_kinds_of_files_are_said_to_be_no_gltf(call: Call) -> None:
     assert "stdin: is no glTF: starts with b'\\x89PNG'" in refusal(call("inspect", stdin=b"\x89PNG\r\n"), 3)
+    run = call("resample", "--fps", "30", stdin=b"HIERARCHY\r\nROOT hips\r\n")
+    assert "stdin: is no glTF: starts with b'HIER'" in refusal(run, 3)
+    assert help_line(run) == "gltf-anim from-euler makes glTF of BVH"
     assert "is no glTF" in refusal(call("inspect", stdin=b"HIERARCHY\nROOT"), 3)
 
 

@@ -46,6 +46,8 @@ def test_a_place_for_nothing_is_refused(line: list[str], call: Call, walk: Path,
     command, *options, out = line
     run = call(command, walk, tmp_path / out, *options)
     assert "stands for nothing" in refusal(run, 2)
+    if "expected a name without" in run.err:
+        assert help_line(run) == "bake writes a file per {clip} and {mesh}, convert to USD one per {clip}"
     assert list(tmp_path.iterdir()) == [walk]
 
 

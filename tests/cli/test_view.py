@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 
+import fixtures
 from anim.gltf.reading.reader import scene
 from anim.show.page import resources
 from cli.io import browser
@@ -145,6 +146,22 @@ def test_wrong_usage(args: tuple[str, ...], words: str, call: Call) -> None:
 def test_a_clip_or_node_that_is_not_there(call: Call) -> None:
     assert "nothing" in refusal(call("view", "-o", "-", "--clip", "nothing", stdin=built("arm")), 5)
     assert "nobody" in refusal(call("view", "-o", "-", "--node", "nobody", stdin=built("arm")), 5)
+
+
+@needs_page
+def test_faults_name_their_file(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    good, bad = fixture("arm"), tmp_path / "bad.gltf"
+    bad.write_bytes(fixtures.BROKEN["times_negative"].data)
+    page = tmp_path / "page.html"
+    for files in ((bad,), (good, bad), (bad, good)):
+        run = call("view", *files, "-o", page)
+        assert run.code == 3
+        assert [line.partition(": bad.gltf: ")[0] for line in run.err.splitlines()] == [
+            *["note: without errors over time"] * (len(files) - 1),
+            "gltf-anim",
+        ]
+    assert ": arm.glb: no clip matches" in refusal(call("view", good, "-o", page, "--clip", "nothing"), 5)
+    assert not page.exists()
 
 
 def test_without_its_script_the_command_that_builds_it_is_named(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

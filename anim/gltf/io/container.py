@@ -21,6 +21,7 @@ MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
 BIN_CHUNK = 0x004E4942
 MAX_GLB_BYTES = 2**32 - 1  # bytes; the header's length field has 32 bits
+BVH_HEADER = b"HIERARCHY"
 LFS_POINTER = b"version https://git-lfs"
 
 Choose: TypeAlias = Callable[[int, str, Bytes], str]
@@ -54,7 +55,11 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
         raise FormatError("is empty (expected glTF)")
     json_text.check_mark(head)
     if head.lstrip()[:1] != b"{":
-        raise FormatError(f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)")
+        is_bvh = head.lstrip()[: len(BVH_HEADER)].upper() == BVH_HEADER
+        raise FormatError(
+            f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)",
+            help="gltf-anim from-euler makes glTF of BVH" if is_bvh else "",
+        )
     raw = content.tobytes()
     parsed, expanded = _parse(raw)
     return Document(parsed, buffers_of(parsed, None, resolve, glb=False), (), json_text.indent_of(raw), expanded)

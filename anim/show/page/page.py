@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
+from anim.errors import AnimError
 from anim.gltf.document import Document
 from anim.gltf.io.buffers import Resolve
 from anim.model import VertexCache
-from anim.show.page.embedding import embed
+from anim.show.page.embedding import Embedded, embed
 from anim.show.page.resources import START, STYLE, TEMPLATE, read_script, read_text
 
 SHOWS = ("bones", "wire", "onion", "clay", "curves", "heat")
@@ -148,11 +149,12 @@ def page(
     """Return an HTML page that plays `file`, or `file` beside `other`, without any other file or network.
 
     title: the names of the files by default. The same arguments give the same bytes.
-    Raises FormatError or UnsupportedError for files that can't be shown, UnsupportedError without the page's script.
+    Raises FormatError or UnsupportedError, with its name, for a file that can't be shown, UnsupportedError without the
+    page's script.
     """
     script, start = read_script(), read_text(START)
     shown = [file] if other is None else [file, other]
-    embedded = [embed(each.document, each.resolve) for each in shown]
+    embedded = [_embed(each) for each in shown]
     files = [
         {"name": each.name, "bytes": each.size, "notes": [*each.notes, *made.notes], **_kind(each)}
         for each, made in zip(shown, embedded, strict=True)
@@ -176,6 +178,14 @@ def page(
         )
         .encode(errors="replace")
     )
+
+
+def _embed(file: PageFile) -> Embedded:
+    """The document as the page holds it; errors name the file."""
+    try:
+        return embed(file.document, file.resolve)
+    except AnimError as error:
+        raise error.at(file.name, ": ") from None
 
 
 def _packed(data: bytes) -> str:
