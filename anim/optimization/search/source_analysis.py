@@ -89,7 +89,7 @@ def analyze_sources(
             ats[n],
             np.searchsorted(ats[n], grids[n]),
             moving[n],
-            _source_keys(_tracks_of(each), grids[n]),
+            _source_keys(_tracks_of(each), grids[n], is_part=each.grid is not None),
             answering,
             local.of_clip(n),
             world[:, n, : len(ats[n])],
@@ -160,8 +160,8 @@ def _max_chord_error(track: Track) -> float:
     return float(playback.arc_distance(playback.steps(track.values).max())) / 2
 
 
-def _source_keys(tracks: Sequence[Track], grid: Floats) -> Bools:
-    """Mask (G, K) of the grid (K,) at the keys of G tracks; all for splines."""
+def _source_keys(tracks: Sequence[Track], grid: Floats, *, is_part: bool) -> Bools:
+    """Mask (G, K) of the grid (K,) at the keys of G tracks; all for splines, and both ends of a part."""
     found = np.zeros((len(tracks), len(grid)), np.bool_)
     for i, track in enumerate(tracks):
         found[i] = track.interpolation is Interpolation.CUBICSPLINE
@@ -171,6 +171,8 @@ def _source_keys(tracks: Sequence[Track], grid: Floats) -> Bools:
         at = np.minimum(np.searchsorted(grid, keys), len(grid) - 1)
         on_grid = grid[at] == keys
         found[np.repeat(np.arange(len(tracks)), counts)[on_grid], at[on_grid]] = True
+    if is_part:
+        found[:, [0, -1]] = True
     return found
 
 
