@@ -82,7 +82,7 @@ def analyze_sources(
     moving = _source_tracks(skeleton, asked, local, arms)
     bent = [n for n, each in enumerate(asked) if _is_bent(each, moving[n])]
     chords = _sample_chords(skeleton, [clips[n] for n in bent], times[bent])
-    rotations = {n: _by_time(chords, k, len(ats[n])) for k, n in enumerate(bent)}
+    rotations = {n: _chords(asked[n], _by_time(chords, k, len(ats[n])), local.of_clip(n)) for k, n in enumerate(bent)}
     return [
         SourceMotion(
             grids[n],
@@ -125,6 +125,14 @@ def _sample_chords(skeleton: Skeleton, clips: Sequence[Clip], times: Floats) -> 
     if not clips:
         return np.empty((4, len(skeleton), 0, 0))
     return sample_transforms(skeleton, clips, times, PATHS[ROTATION], sampler("nlerp"))
+
+
+def _chords(asked: FreeTracks, chords: Floats, local: tuple[Floats, Floats, Floats]) -> Floats:
+    """Rotations (N, W, 4) with nlerp of the nodes with free tracks only: trials play the others as in `local`."""
+    nodes = [track.node for track in _tracks_of(asked) if track.path == "rotation" and track.node is not None]
+    found = local[ROTATION].copy()
+    found[nodes] = chords[nodes]
+    return found
 
 
 def _with_continuous_signs(rotation: Floats) -> Floats:
