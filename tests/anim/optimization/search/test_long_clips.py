@@ -150,6 +150,21 @@ def test_few_keys_beside_many_are_no_trouble_where_parts_meet(degrees: float) ->
     assert sum(len(each.times) for each in found.solution.clip.tracks) < 200
 
 
+@pytest.mark.parametrize("whole", [1, 10**9])
+def test_few_keys_far_apart_stay_those_of_the_source(whole: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter turn every two seconds beside dense keys, of which more would be wrong in some players."""
+    monkeypatch.setattr(long_clips, "MAX_WHOLE_MATRICES", whole)
+    what = clip(
+        track("translation", TIMES, np.stack((0.1 * TIMES, np.sin(2 * TIMES), 0 * TIMES), axis=1), node=0),
+        track("rotation", TIMES[::60], about("x", [0, 90] * 5 + [0]), node=1),
+        track("rotation", TIMES, turning(1.5, times=TIMES), node=2),
+    )
+    found = _optimized(what)
+    assert found.verdict.holds
+    assert not found.without_loss
+    assert sum(len(each.times) for each in found.solution.clip.tracks) < 400
+
+
 def test_parts_have_keys_at_their_ends_on_axes_of_source_keys_too() -> None:
     what = clip(
         track("translation", TIMES, np.stack((TIMES, 0 * TIMES, 0 * TIMES), axis=1), node=0),
