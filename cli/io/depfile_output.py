@@ -26,7 +26,7 @@ def check(path: str, output: str, values: Iterable[Any]) -> None:
     if path == documents.PIPE:
         raise UsageError("--depfile is '-' (expected a file name)", help="/dev/stdout writes the rule to stdout")
     documents.check_file(path)
-    if _is_same(path, output):
+    if _is_same(path, output) or (output.endswith(".gltf") and _is_same(path, output[: -len("gltf")] + "bin")):
         raise UsageError(f"{path}: --depfile would replace OUT (expected another file)")
     for value in values:
         _refuse_inputs(path, [value] if isinstance(value, str) else value if isinstance(value, list | tuple) else ())

@@ -84,6 +84,7 @@ def test_outputs_with_placeholders_are_all_named(folder: Path, call: Call) -> No
         ("-", ["--depfile", "x.d"], "--depfile needs an output file: name OUT"),
         ("out.glb", ["--depfile", "out.glb"], "out.glb: --depfile would replace OUT (expected another file)"),
         ("out.glb", ["--depfile", "-"], "--depfile is '-' (expected a file name)"),
+        ("out.gltf", ["--depfile", "out.bin"], "out.bin: --depfile would replace OUT (expected another file)"),
         ("out.glb", ["--depfile", "none/x.d"], "none/x.d: there is no folder 'none'"),
     ],
 )

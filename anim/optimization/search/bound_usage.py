@@ -22,6 +22,7 @@ MAX_BLOCK_MATRICES = 100_000  # world matrices of nodes at a time: 10 MB; more a
 MIN_BLOCK_TIMES = 64
 # A clip is measured in float32, in half the time, where its bounds are this many rounding errors of its positions.
 MIN_ROUNDINGS = 4000
+PROBE_TIMES = 8  # of a clip, at which the nodes between the roots and the points are looked at
 
 
 class _SourceMatrices(NamedTuple):
@@ -96,10 +97,19 @@ class BoundUsage:
         columns = np.abs(self._source.columns).max(axis=(1, 3), initial=0.0).reshape(-1, 4, len(self._clips.sources))
         farthest = np.abs(self._clips.points.factors[..., :3]).max(initial=0.0)
         reach = columns[:, :3].max(axis=(0, 1), initial=0.0) * farthest + columns[:, 3].max(axis=0, initial=0.0)
+        reach = np.maximum(reach, self._farthest_nodes())
         smallest = self._allowed.min(axis=0, initial=np.inf)
         if self._bounds.max_speed_error is not None:
             smallest = np.minimum(smallest, self._bounds.max_speed_error * MIN_INTERVAL_S)
         return np.asarray(smallest >= MIN_ROUNDINGS * np.finfo(np.float32).eps * reach)
+
+    def _farthest_nodes(self) -> Floats:
+        """The largest coordinate (B,) of the nodes above points, in m: of a far parent the point may be near again."""
+        every = np.arange(len(self._clips.sources))
+        times = slice(None, None, -(-self._clips.at.shape[1] // PROBE_TIMES))
+        world = self._world([part[..., times] for part in self._clips.local], times, self._source, every)
+        places = np.abs(world[:, 3]).reshape(len(world), 3, len(every), -1)
+        return np.asarray(places.max(axis=(0, 1, 3), initial=0.0))
 
     @cached_property
     def _single_source(self) -> _SourceMatrices:

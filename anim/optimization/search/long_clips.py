@@ -1,6 +1,7 @@
 """Search of clips of any length: long ones part after part, so that memory does not follow their length.
 
 Where two parts meet, all tracks with keys have one with the source's value, so that each part plays as it was measured.
+A key inside a long arc would bend it in players with component-wise interpolation: such tracks keep the source's keys.
 """
 
 from __future__ import annotations
@@ -11,13 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.model import Clip, TimeAxis, Track
+from anim.maths import quaternion
+from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.optimization.options import Effort
+from anim.optimization.search import playback
 from anim.optimization.search.context import Context
 from anim.optimization.search.lockstep import ClipPart, SearchRequest, SearchResult, search_clips
 from anim.optimization.search.plan import FoundKeys, TrackAction
 from anim.optimization.search.source_motion import SourceTrack, key_grid
 from anim.optimization.search.trial import storage_tolerances
+from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.clip_ends import is_closed
 from anim.optimization.tracks.quantization import EncodedKeys, Encoding
@@ -60,6 +64,10 @@ def _search_in_parts(context: Context, request: SearchRequest, grid: Floats, eff
     """
     length = max(PART_MATRICES // max(len(context.skeleton), 1), MIN_PART_KEYS)
     cuts = np.linspace(0, len(grid) - 1, -(-len(grid) // length) + 1).round().astype(np.int64)
+    limit = CHORD_BOUND_FRACTION * request.bound
+    bent = [2 * context.size * _chord_error_at(request.clip.tracks[i], grid[cuts]) > limit for i in request.free]
+    kept = [i for i, is_bent in zip(request.free, bent, strict=True) if is_bent]
+    request = _free_tracks(request, np.flatnonzero(~np.array(bent)).tolist())
     tracks = [request.clip.tracks[i] for i in request.free]
     found: dict[int, list[_PartKeys]] = {}
     part = ClipPart(grid, ())
@@ -74,7 +82,37 @@ def _search_in_parts(context: Context, request: SearchRequest, grid: Floats, eff
             part = part._replace(groups=result.result.groups)
             request = request._replace(shared=_with_constants(request.shared, result))
         found[n] = list(_keys_of_part(result, first, last))
-    return _join([found[n] for n in range(len(cuts) - 1)], tracks, request.free, grid, context.coding)
+    joined = _join([found[n] for n in range(len(cuts) - 1)], tracks, request.free, grid, context.coding)
+    return _with_source_keys(joined, request.clip, kept)
+
+
+def _chord_error_at(track: Track, times: Floats) -> float:
+    """Largest distance between slerp and nlerp, in quaternion units, over the keys around times that are no keys."""
+    if track.path != "rotation" or track.interpolation is not Interpolation.LINEAR:
+        return 0.0
+    after = np.searchsorted(track.times, times)
+    inside = (after > 0) & (after < len(track.times))
+    after, times = after[inside], times[inside]
+    after = after[track.times[after] != times]
+    angles = quaternion.angle_between(track.values[after - 1], track.values[after])
+    return float(playback.arc_distance(angles).max(initial=0.0)) / 2
+
+
+def _free_tracks(request: SearchRequest, some: Sequence[int]) -> SearchRequest:
+    """The request for some of its free tracks, by their positions; the others play as in the source."""
+    free, shared = tuple(request.free[k] for k in some), tuple(request.shared[k] for k in some)
+    return request._replace(free=free, droppable=request.droppable[list(some)], shared=shared)
+
+
+def _with_source_keys(found: FoundKeys, clip: Clip, kept: Sequence[int]) -> FoundKeys:
+    """The result with further tracks of the clip, whose keys are those of the source."""
+    keys, on = dict(found.keys), dict(found.on)
+    for number, i in enumerate(kept, len(found.tracks)):
+        times, first = np.unique(clip.tracks[i].times.astype(np.float32), return_index=True)
+        on[number] = np.isin(found.grid, times)
+        keys[number] = EncodedKeys(clip.tracks[i].values[first], "float32")
+    actions = np.append(found.actions, np.full(len(kept), TrackAction.KEYED, np.int64))
+    return FoundKeys(found.grid, (*found.tracks, *kept), actions, keys, on)
 
 
 def _by_motion(tracks: Sequence[Track], times: Floats) -> list[int]:

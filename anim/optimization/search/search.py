@@ -43,7 +43,8 @@ def search(
     """Yield trials of one clip, of which it takes the results; return the smallest within all bounds, None without one.
 
     bound: m, only for the size of budgets; acceptance depends on the result's bound usage. leeway: the ratio of each
-    track's moment arm to the compensated one (G,). groups: of tracks that share a time axis in every trial, if any.
+    track's moment arm to the compensated one (G,). groups: of tracks that share a time axis, if any, unless only source
+    keys hold the bounds.
     """
     return _Search(source, bound, effort, leeway, groups).run()
 
@@ -74,8 +75,8 @@ class _Search:
         if self._groups:
             start = replace(start, axes="groups", groups=self._groups)
         yield from self._adapt(start, self._effort.rounds)
-        if self._best is None and not self._groups and not self._source.own.all():
-            start = replace(start, axes="own")
+        if self._best is None and not self._source.own.all():
+            start = replace(start, axes="own", groups=())
             yield from self._adapt(start, self._effort.rounds)
         if self._best is None:
             for fraction in self._effort.thresholds:

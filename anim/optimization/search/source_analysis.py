@@ -82,14 +82,14 @@ def analyze_sources(
     moving = _source_tracks(skeleton, asked, local, arms)
     bent = [n for n, each in enumerate(asked) if _is_bent(each, moving[n])]
     chords = _sample_chords(skeleton, [clips[n] for n in bent], times[bent])
-    rotations = {n: _by_time(chords, k, len(ats[n])) for k, n in enumerate(bent)}
+    rotations = {n: _chords(asked[n], _by_time(chords, k, len(ats[n])), local.of_clip(n)) for k, n in enumerate(bent)}
     return [
         SourceMotion(
             grids[n],
             ats[n],
             np.searchsorted(ats[n], grids[n]),
             moving[n],
-            _source_keys(_tracks_of(each), grids[n]),
+            _source_keys(_tracks_of(each), grids[n], is_part=each.grid is not None),
             answering,
             local.of_clip(n),
             world[:, n, : len(ats[n])],
@@ -127,6 +127,14 @@ def _sample_chords(skeleton: Skeleton, clips: Sequence[Clip], times: Floats) -> 
     return sample_transforms(skeleton, clips, times, PATHS[ROTATION], sampler("nlerp"))
 
 
+def _chords(asked: FreeTracks, chords: Floats, local: tuple[Floats, Floats, Floats]) -> Floats:
+    """Rotations (N, W, 4) with nlerp of the nodes with free tracks only: trials play the others as in `local`."""
+    nodes = [track.node for track in _tracks_of(asked) if track.path == "rotation" and track.node is not None]
+    found = local[ROTATION].copy()
+    found[nodes] = chords[nodes]
+    return found
+
+
 def _with_continuous_signs(rotation: Floats) -> Floats:
     """Rotations (4, N, B, W), written over, with neighbors in time in one hemisphere."""
     turns = np.where(playback.dot(rotation[..., 1:], rotation[..., :-1]) < 0, -1.0, 1.0)
@@ -160,8 +168,8 @@ def _max_chord_error(track: Track) -> float:
     return float(playback.arc_distance(playback.steps(track.values).max())) / 2
 
 
-def _source_keys(tracks: Sequence[Track], grid: Floats) -> Bools:
-    """Mask (G, K) of the grid (K,) at the keys of G tracks; all for splines."""
+def _source_keys(tracks: Sequence[Track], grid: Floats, *, is_part: bool) -> Bools:
+    """Mask (G, K) of the grid (K,) at the keys of G tracks; all for splines, and both ends of a part."""
     found = np.zeros((len(tracks), len(grid)), np.bool_)
     for i, track in enumerate(tracks):
         found[i] = track.interpolation is Interpolation.CUBICSPLINE
@@ -171,6 +179,8 @@ def _source_keys(tracks: Sequence[Track], grid: Floats) -> Bools:
         at = np.minimum(np.searchsorted(grid, keys), len(grid) - 1)
         on_grid = grid[at] == keys
         found[np.repeat(np.arange(len(tracks)), counts)[on_grid], at[on_grid]] = True
+    if is_part:
+        found[:, [0, -1]] = True
     return found
 
 

@@ -33,7 +33,8 @@ class StackedClips:
     varying_matrices: (V, 4, 3, B, W) columns of their local matrices. varying_rotation: (4, V, B, W). constant,
     constant_matrices, constant_rotation: the same of nodes that stay, without clips and times. points: of all clips, on
     nodes that move in their parents' space, or are roots. levels: of the points' nodes. columns: (4 J, 3, B, W) of
-    their world matrices; by_chord: the same with nlerp. sources: without world matrices.
+    their world matrices; by_chord: the same with nlerp, which differs in the clips `bent`. sources: without world
+    matrices.
     """
 
     def __init__(self, skeleton: Skeleton, sources: Sequence[SourceMotion], points: PointMatrix) -> None:
@@ -71,7 +72,8 @@ class StackedClips:
         self.points, self.levels = _rebind(points, skeleton, self.constant, self.constant_matrices)
         self.columns = self._columns([source.world for source in sources])
         self.by_chord = self.columns
-        if any(source.chords is not None for source in sources):
+        self.bent = frozenset(n for n, source in enumerate(sources) if source.chords is not None)
+        if self.bent:
             self.by_chord = self._columns([_chord_world(skeleton, source, self.levels) for source in sources])
 
     @property

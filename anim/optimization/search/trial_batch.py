@@ -205,8 +205,8 @@ class TrialBatch:
         return results
 
     def _bent_clips(self, made: Sequence[StoredTracks], axes: KeyedAxes) -> set[int]:
-        """The clips where slerp and nlerp differ noticeably."""
-        bent: set[int] = set()
+        """The clips where slerp and nlerp differ noticeably, in the result or in the source."""
+        bent = set(self._clips.bent)
         for each in (some for some in made if len(some.keys) == 4):
             counts = axes.intervals.counts[axes.axis_of[each.tracks]]
             turned = playback.steps(np.transpose(each.keys, (2, 1, 0)))  # (K - 1, T)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,15 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
 from anim.maths import quaternion
+from anim.model import Scene
 from anim.optimization.options import Bounds
 from anim.optimization.search import bound_usage
 from anim.optimization.search.bound_usage import MIN_INTERVAL_S, MIN_ROUNDINGS, BoundUsage
 from anim.optimization.search.playback import level_world_matrices
 from anim.optimization.search.source_motion import PATHS, SourceMotion
 from anim.optimization.search.stacked_clips import StackedClips
-from tests.anim.optimization.making import nodding, truth_of, waving
+from tests.anim.measure.error.brute_force import points_on_a_node
+from tests.anim.optimization.making import TIMES, nodding, truth_of, waving
 from tests.anim.optimization.search.stacks import CLIPS, OF, POINTS, stack
 from tests.calls import count_calls
+from tests.clips import clip, skeleton, track
 
 ALLOWED = np.random.default_rng(11).uniform(0.5, 2, (len(POINTS), len(CLIPS)))
 LEVELS = OF.skeleton.levels()
@@ -140,6 +144,17 @@ def test_clips_with_wide_bounds_are_measured_in_float32(monkeypatch: pytest.Monk
     exact = BoundUsage(OF.skeleton, clips, far, Bounds(0.1, 0.0)).slerp_raw(shown, EVERY)
     assert mixed == pytest.approx(exact, rel=1e-5, abs=SINGLE)
     assert (mixed != exact).any(axis=0).tolist() == [True, False, True]
+
+
+def test_parents_far_away_need_float64_though_points_are_near() -> None:
+    """A root goes a million metres there and back, and its child the other way: float32 worlds are off by some cm."""
+    far = np.outer(np.sin(TIMES), [1e6, 0, 0])
+    away = clip(track("translation", TIMES, far, node=0), track("translation", TIMES, 0.3 - far, node=1))
+    (shown,) = points_on_a_node([[0, 0, 0], [1, 0, 0]]).instances
+    clips = stack(away, of=Scene(skeleton([-1, 0]), (replace(shown, node=1),)))
+    allowed = np.full((len(clips.points), 1), 0.01)
+    usage = BoundUsage(skeleton([-1, 0]), clips, allowed, Bounds(0.01, 0.0))
+    assert usage.slerp_raw(clips.local, np.array([0])).max() < 1e-3
 
 
 @pytest.mark.parametrize("length", [1, 2, 7])

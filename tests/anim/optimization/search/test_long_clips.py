@@ -9,11 +9,12 @@ import pytest
 
 from anim.model import Clip, Interpolation
 from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
-from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Request
+from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Reference, Request
 from anim.optimization.search import long_clips
 from anim.optimization.search.lockstep import SearchRequest, search_clips
 from anim.optimization.search.long_clips import search_all
 from anim.optimization.search.plan import FoundKeys, TrackAction
+from anim.optimization.search.source_analysis import FreeTracks, analyze_sources
 from anim.optimization.tracks.clip_ends import opened_tracks
 from anim.sampling.pose import sample_pose
 from tests.anim.optimization.making import scene, setting_of, task_of, turning, waving
@@ -134,6 +135,45 @@ def test_short_clips_beside_a_long_one_are_searched_as_always(monkeypatch: pytes
     assert together[1] is not None
     assert alone is not None
     assert {i: on.tolist() for i, on in together[1].on.items()} == {i: on.tolist() for i, on in alone.found.on.items()}
+
+
+@pytest.mark.parametrize("degrees", [1.0, 120.0])
+def test_few_keys_beside_many_are_no_trouble_where_parts_meet(degrees: float) -> None:
+    """Whether parts without a key of the source move in an arc that a key would bend in some players, or hardly."""
+    what = clip(
+        track("translation", TIMES, np.stack((TIMES, np.sin(TIMES), 0 * TIMES), axis=1), node=0),
+        track("rotation", TIMES[[2, 340, 595]], about("x", [0, degrees, 0]), node=1),
+    )
+    found = _optimized(what)
+    assert found.verdict.holds
+    assert not found.without_loss
+    assert sum(len(each.times) for each in found.solution.clip.tracks) < 200
+
+
+@pytest.mark.parametrize("whole", [1, 10**9])
+def test_few_keys_far_apart_stay_those_of_the_source(whole: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter turn every two seconds beside dense keys, of which more would be wrong in some players."""
+    monkeypatch.setattr(long_clips, "MAX_WHOLE_MATRICES", whole)
+    what = clip(
+        track("translation", TIMES, np.stack((0.1 * TIMES, np.sin(2 * TIMES), 0 * TIMES), axis=1), node=0),
+        track("rotation", TIMES[::60], about("x", [0, 90] * 5 + [0]), node=1),
+        track("rotation", TIMES, turning(1.5, times=TIMES), node=2),
+    )
+    found = _optimized(what)
+    assert found.verdict.holds
+    assert not found.without_loss
+    assert sum(len(each.times) for each in found.solution.clip.tracks) < 400
+
+
+def test_parts_have_keys_at_their_ends_on_axes_of_source_keys_too() -> None:
+    what = clip(
+        track("translation", TIMES, np.stack((TIMES, 0 * TIMES, 0 * TIMES), axis=1), node=0),
+        track("rotation", TIMES[[0, 300, 600]], about("x", [0, 30, 0]), node=1),
+    )
+    part = FreeTracks(what, (0, 1), 1e-4, TIMES[150:301])
+    context = setting_of(OF, (what,))
+    (source,) = analyze_sources(OF.skeleton, [part], context.points, context.answering, reference=Reference.KEYS)
+    assert np.flatnonzero(source.own[1]).tolist() == [0, 150]
 
 
 @pytest.mark.parametrize("start", [0.0, 0.04, 3.2, 19.9])

@@ -125,6 +125,20 @@ def test_no_change_of_a_track_carries_a_point_further_than_its_meters(seed: int,
         assert moved.max() > 0.05 * allowed  # and it says no more than it must
 
 
+def test_tracks_that_stay_have_no_chords() -> None:
+    """Trials play them on the arc: chords of the source alone would count as an error of the free tracks."""
+    of = scene()
+    quarters = track("scale", [0, 0.25, 1], np.ones((3, 3)))
+    both = clip(*(track("rotation", [0, 1], about("x", [0, 120]), node=i) for i in (1, 2)), quarters)
+    points = every_point(of)
+    answering = AnsweringPoints(points, of.skeleton.parents)
+    (source,) = analyze_sources(
+        of.skeleton, [FreeTracks(both, (1, 2), 1e-5)], points, answering, reference=Reference.CURVE
+    )
+    assert source.chords is not None
+    assert np.abs(source.chords - source.local[1]).max(axis=(1, 2)).round(3).nonzero()[0].tolist() == [2]
+
+
 def test_chords_are_asked_for_where_they_leave_the_arc() -> None:
     of = scene()
     points = every_point(of)
