@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.maths import quaternion
-from anim.model import Clip, Interpolation, TimeAxis, Track
-from anim.optimization.options import Effort
-from anim.optimization.search import playback
+from anim.model import Clip, Interpolation, Track
+from anim.optimization.options import Effort, Packing
+from anim.optimization.search.clip_parts import chord_error_at, cut_clip, find_cuts, order_by_motion
 from anim.optimization.search.context import Context
 from anim.optimization.search.lockstep import ClipPart, SearchRequest, SearchResult, search_clips
 from anim.optimization.search.plan import FoundKeys, TrackAction
@@ -24,7 +23,8 @@ from anim.optimization.search.trial import storage_tolerances
 from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION
 from anim.optimization.tracks import quantization
 from anim.optimization.tracks.clip_ends import is_closed
-from anim.optimization.tracks.quantization import EncodedKeys, Encoding
+from anim.optimization.tracks.quantization import EncodedKeys, Encoding, Form
+from anim.sampling.track import sample
 
 MAX_WHOLE_MATRICES = 80_000  # possible key times × nodes of a clip that is searched at once, in about 120 MB
 PART_MATRICES = 40_000
@@ -57,45 +57,34 @@ def search_all(context: Context, requests: Sequence[SearchRequest], effort: Effo
     ]
 
 
-def _search_in_parts(context: Context, request: SearchRequest, grid: Floats, effort: Effort) -> FoundKeys | None:
+def _search_in_parts(context: Context, request: SearchRequest, grid: Floats, effort: Effort) -> FoundKeys:
     """Search the part with the most motion first: the others have its groups of tracks, and its constants if they can.
 
-    grid: (K,) s, possible key times of the clip.
+    A part without a result keeps the source's keys. grid: (K,) s, possible key times of the clip.
     """
     length = max(PART_MATRICES // max(len(context.skeleton), 1), MIN_PART_KEYS)
-    cuts = np.linspace(0, len(grid) - 1, -(-len(grid) // length) + 1).round().astype(np.int64)
+    cuts = find_cuts([request.clip.tracks[i] for i in request.free], grid, length)
     limit = CHORD_BOUND_FRACTION * request.bound
-    bent = [2 * context.size * _chord_error_at(request.clip.tracks[i], grid[cuts]) > limit for i in request.free]
+    bent = [2 * context.size * chord_error_at(request.clip.tracks[i], grid[cuts]) > limit for i in request.free]
     kept = [i for i, is_bent in zip(request.free, bent, strict=True) if is_bent]
     request = _free_tracks(request, np.flatnonzero(~np.array(bent)).tolist())
     tracks = [request.clip.tracks[i] for i in request.free]
     found: dict[int, list[_PartKeys]] = {}
     part = ClipPart(grid, ())
-    for n in _by_motion(tracks, grid[cuts]):
+    for n in order_by_motion(tracks, grid[cuts]) if tracks else ():
         first, last = int(cuts[n]), int(cuts[n + 1])
         part = part._replace(grid=grid[first : last + 1])
-        clip = _cut(request.clip, float(grid[first]), float(grid[last]))
+        clip = cut_clip(request.clip, float(grid[first]), float(grid[last]))
         (result,) = search_clips(context, [request._replace(clip=clip, part=part)], effort)
         if result is None:
-            return None
-        if not found:
+            found[n] = [_source_keys(clip.tracks[i], part.grid, first) for i in request.free]
+            continue
+        if not part.groups:
             part = part._replace(groups=result.result.groups)
             request = request._replace(shared=_with_constants(request.shared, result))
         found[n] = list(_keys_of_part(result, first, last))
-    joined = _join([found[n] for n in range(len(cuts) - 1)], tracks, request.free, grid, context.coding)
+    joined = _join([found[n] for n in sorted(found)], tracks, request.free, grid, context.coding)
     return _with_source_keys(joined, request.clip, kept)
-
-
-def _chord_error_at(track: Track, times: Floats) -> float:
-    """Largest distance between slerp and nlerp, in quaternion units, over the keys around times that are no keys."""
-    if track.path != "rotation" or track.interpolation is not Interpolation.LINEAR:
-        return 0.0
-    after = np.searchsorted(track.times, times)
-    inside = (after > 0) & (after < len(track.times))
-    after, times = after[inside], times[inside]
-    after = after[track.times[after] != times]
-    angles = quaternion.angle_between(track.values[after - 1], track.values[after])
-    return float(playback.arc_distance(angles).max(initial=0.0)) / 2
 
 
 def _free_tracks(request: SearchRequest, some: Sequence[int]) -> SearchRequest:
@@ -113,42 +102,6 @@ def _with_source_keys(found: FoundKeys, clip: Clip, kept: Sequence[int]) -> Foun
         keys[number] = EncodedKeys(clip.tracks[i].values[first], "float32")
     actions = np.append(found.actions, np.full(len(kept), TrackAction.KEYED, np.int64))
     return FoundKeys(found.grid, (*found.tracks, *kept), actions, keys, on)
-
-
-def _by_motion(tracks: Sequence[Track], times: Floats) -> list[int]:
-    """The parts between `times` (B + 1,): the one with the most motion, then the others in order."""
-    total = np.zeros(len(times) - 1)
-    for track in tracks:
-        steps = np.linalg.norm(np.diff(track.values, axis=0), axis=1)
-        way = np.interp(times, track.times, np.append(0.0, np.cumsum(steps)))
-        total += np.diff(way)
-    most = int(total.argmax())
-    return [most, *(n for n in range(len(total)) if n != most)]
-
-
-def _cut(clip: Clip, start: float, end: float) -> Clip:
-    """The clip with those keys only that count between two times."""
-    axes: dict[TimeAxis, tuple[slice, TimeAxis]] = {}
-    for axis in clip.time_axes:
-        last = min(int(np.searchsorted(axis.times, end)), len(axis) - 1)
-        first = min(max(int(np.searchsorted(axis.times, start, side="right")) - 1, 0), last)
-        axes[axis] = slice(first, last + 1), TimeAxis(axis.times[first : last + 1])
-    return Clip(clip.name, tuple(_select(track, *axes[track.time_axis]) for track in clip.tracks))
-
-
-def _select(track: Track, keys: slice, axis: TimeAxis) -> Track:
-    arriving, leaving = (None if each is None else each[keys] for each in (track.in_tangents, track.out_tangents))
-    return Track.unchecked(
-        track.node,
-        track.path,
-        track.interpolation,
-        axis,
-        track.values[keys],
-        arriving,
-        leaving,
-        track.pointer,
-        track.storage,
-    )
 
 
 def _with_constants(shared: Sequence[Sequence[Floats]], result: SearchResult) -> tuple[Sequence[Floats], ...]:
@@ -173,6 +126,20 @@ def _keys_of_part(found: SearchResult, first: int, last: int) -> Iterator[_PartK
             # within one step of the grid from the source's value to the constant, which is as near there
             at = np.array([first, first + 1, last - 1, last])
             yield _PartKeys(action, constant, at, _between_ends(track, constant), tolerance)
+
+
+def _source_keys(track: Track, grid: Floats, first: int) -> _PartKeys:
+    """The source's keys of a track in a part with the times `grid` (K,), of splines all of them; and its ends.
+
+    first: index of the part's first time on the grid of the clip.
+    """
+    is_key = np.isin(grid, track.times.astype(np.float32)) | (track.interpolation is Interpolation.CUBICSPLINE)
+    is_key[[0, -1]] = True
+    values = sample(track, grid[is_key])
+    if track.path == "rotation":
+        turns = np.where((values[1:] * values[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+        values[1:] *= np.cumprod(turns)[:, None]
+    return _PartKeys(TrackAction.KEYED, values[0], first + np.flatnonzero(is_key), values, 0.0)
 
 
 def _between_ends(track: SourceTrack, constant: Floats) -> Floats:
@@ -208,7 +175,7 @@ def _joint_action(parts: Sequence[_PartKeys]) -> TrackAction:
 
 
 def _joint_keys(parts: Sequence[_PartKeys], track: Track, coding: Encoding) -> EncodedKeys:
-    """The keys of all parts, those where two meet once, in one format: that of the smallest tolerance."""
+    """The keys of all parts, those where two meet once, in one format."""
     pieces: list[Floats] = []
     for each in parts:
         values = each.values
@@ -218,6 +185,17 @@ def _joint_keys(parts: Sequence[_PartKeys], track: Track, coding: Encoding) -> E
     joined = np.concatenate(pieces)
     if is_closed(track):
         joined[-1] = -joined[0] if track.path == "rotation" and joined[-1] @ joined[0] < 0 else joined[0]
-    keyed = [each.tolerance for each in parts if each.action == TrackAction.KEYED]
-    tolerance = min(keyed or [each.tolerance for each in parts])
-    return quantization.encode(joined, quantization.choose_format(joined, track.path, tolerance, coding.packing))
+    return quantization.encode(joined, _joint_format(parts, joined, track.path, coding.packing))
+
+
+def _joint_format(parts: Sequence[_PartKeys], joined: Floats, path: str, packing: Packing) -> Form:
+    """The format of all parts; if they have several, that of the smallest tolerance.
+
+    Of half of it with a codec, whose formats round values of a coarser one again.
+    """
+    keyed = [each for each in parts if each.action == TrackAction.KEYED] or parts
+    forms = {quantization.choose_format(each.values, path, each.tolerance, packing) for each in keyed}
+    if len(forms) == 1:
+        return forms.pop()
+    tolerance = min(each.tolerance for each in keyed)
+    return quantization.choose_format(joined, path, tolerance if packing is Packing.CORE else tolerance / 2, packing)

@@ -11,6 +11,7 @@ from anim.model import Clip, Interpolation
 from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
 from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Reference, Request
 from anim.optimization.search import long_clips
+from anim.optimization.search.clip_parts import cut_clip, find_cuts
 from anim.optimization.search.lockstep import SearchRequest, search_clips
 from anim.optimization.search.long_clips import search_all
 from anim.optimization.search.plan import FoundKeys, TrackAction
@@ -118,11 +119,35 @@ def test_tracks_share_an_axis_over_all_parts() -> None:
     assert (found.on[0] != found.on[2]).any()
 
 
-def test_nothing_is_found_if_a_part_has_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = iter([True, True, False])
+def test_a_part_without_a_result_keeps_the_sources_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the others do not: one bad second costs no more than itself."""
+    answers = iter([False, True, True, False, True])
     monkeypatch.setattr(long_clips, "search_clips", lambda *given: search_clips(*given) if next(answers) else [None])
-    what = _walking()
-    assert search_all(setting_of(OF, (what,)), [_request(what)], EFFORTS["fast"]) == [None]
+    found = _optimized(_walking())
+    assert found.verdict.holds
+    assert not found.without_loss
+    swing = next(each for each in found.solution.clip.tracks if each.target == (1, "rotation"))
+    counts = np.histogram(swing.times, np.linspace(0, 20, PARTS + 1))[0]
+    assert sorted(counts > 100).count(True) == 2
+    assert counts.min() < 30
+
+
+def test_nothing_is_searched_if_all_tracks_keep_the_sources_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As those do that turn by half a turn between keys, at which nothing is cut."""
+    searched = count_calls(monkeypatch, long_clips, "search_clips")
+    times = np.arange(500) / 30
+    turns = about("x", np.resize([0, 170, 20], 250))
+    what = clip(*(track("rotation", times[i::2], turns, node=1 + i) for i in range(2)))
+    found = _found(what)
+    assert not searched
+    assert [int(found.on[i].sum()) for i in range(2)] == [250, 250]
+
+
+def test_parts_meet_where_most_tracks_have_keys() -> None:
+    times = np.arange(1001) / 64
+    tracks = [track("translation", at, np.zeros((len(at), 3)), node=i) for i, at in enumerate((times, times[::60]))]
+    assert find_cuts(tracks, times, 250).tolist() == [0, 180, 420, 600, 780, 1000]
+    assert find_cuts(tracks[:1], times, 250).tolist() == [0, 200, 400, 600, 800, 1000]
 
 
 def test_short_clips_beside_a_long_one_are_searched_as_always(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +213,7 @@ def test_a_part_of_a_clip_plays_like_the_clip(start: float) -> None:
         track("rotation", TIMES[30:31], about("x", [20]), node=3),
     )
     at = np.linspace(start, start + 0.1, 60)
-    part = long_clips._cut(what, at[0], at[-1])
+    part = cut_clip(what, at[0], at[-1])
     assert max(len(each.times) for each in part.tracks) <= 6
     whole, found = (sample_pose(OF.skeleton, each, at) for each in (what, part))
     np.testing.assert_allclose(found.translation, whole.translation, atol=1e-12)
