@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterator
 
 from anim.errors import FormatError
-from cli.reports.indented_json import IndentedJson
 
 
 def dump(content: object, *, indent: int | None = 1) -> str:
@@ -18,7 +17,7 @@ def dump(content: object, *, indent: int | None = 1) -> str:
         if indent is None:
             text.write(json.dumps(content, allow_nan=False))
         else:  # piece by piece: a list of all pieces takes several times the memory of the text
-            IndentedJson(text.write, indent).value(content)
+            json.dump(content, text, allow_nan=False, ensure_ascii=False, indent=indent)
     except ValueError:
         check_finite(content)
         raise

@@ -10,6 +10,7 @@ from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.optimization.search import playback
+from anim.optimization.search.source_analysis import source_keys
 
 MAX_SHIFT = 0.2  # of a part's length, by which a cut is moved to a time at which more tracks have keys
 
@@ -20,7 +21,7 @@ def find_cuts(tracks: Sequence[Track], grid: Floats, length: int) -> Ints:
     Of the times near even ones, those at which most tracks have keys.
     """
     even = np.linspace(0, len(grid) - 1, -(-len(grid) // length) + 1).round().astype(np.int64)
-    counts = _num_tracks_with_keys(tracks, grid)
+    counts = source_keys(tracks, grid, is_part=False).sum(axis=0)
     shift = max(round(MAX_SHIFT * length), 1)
     cuts = even.copy()
     for n in range(1, len(even) - 1):
@@ -28,17 +29,6 @@ def find_cuts(tracks: Sequence[Track], grid: Floats, length: int) -> Ints:
         best = near[counts[near] == counts[near].max()]
         cuts[n] = best[np.abs(best - even[n]).argmin()]
     return cuts
-
-
-def _num_tracks_with_keys(tracks: Sequence[Track], grid: Floats) -> Ints:
-    """Number of tracks (K,) with a key at each time of the grid."""
-    counts = np.zeros(len(grid), np.int64)
-    users: dict[TimeAxis, int] = {}
-    for track in tracks:
-        users[track.time_axis] = users.get(track.time_axis, 0) + 1
-    for axis, number in users.items():
-        counts[np.isin(grid, axis.times.astype(np.float32))] += number
-    return counts
 
 
 def chord_error_at(track: Track, times: Floats) -> float:

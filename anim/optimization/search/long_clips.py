@@ -12,12 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.model import Clip, Interpolation, Track
+from anim.maths import quaternion
+from anim.model import Clip, Track
 from anim.optimization.options import Effort, Packing
 from anim.optimization.search.clip_parts import chord_error_at, cut_clip, find_cuts, order_by_motion
 from anim.optimization.search.context import Context
 from anim.optimization.search.lockstep import ClipPart, SearchRequest, SearchResult, search_clips
 from anim.optimization.search.plan import FoundKeys, TrackAction
+from anim.optimization.search.source_analysis import source_keys
 from anim.optimization.search.source_motion import SourceTrack, key_grid
 from anim.optimization.search.trial import storage_tolerances
 from anim.optimization.search.trial_batch import CHORD_BOUND_FRACTION
@@ -133,12 +135,8 @@ def _source_keys(track: Track, grid: Floats, first: int) -> _PartKeys:
 
     first: index of the part's first time on the grid of the clip.
     """
-    is_key = np.isin(grid, track.times.astype(np.float32)) | (track.interpolation is Interpolation.CUBICSPLINE)
-    is_key[[0, -1]] = True
+    (is_key,) = source_keys([track], grid, is_part=True)
     values = sample(track, grid[is_key])
-    if track.path == "rotation":
-        turns = np.where((values[1:] * values[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-        values[1:] *= np.cumprod(turns)[:, None]
     return _PartKeys(TrackAction.KEYED, values[0], first + np.flatnonzero(is_key), values, 0.0)
 
 
@@ -154,7 +152,7 @@ def _join(
     actions = np.full(len(tracks), TrackAction.KEYED, np.int64)
     keys, on = {}, {}
     for k, (track, some) in enumerate(zip(tracks, zip(*parts, strict=True), strict=True)):
-        actions[k] = _joint_action(some)
+        actions[k] = _joint_action(some, track.path)
         if actions[k] == TrackAction.CONSTANT:
             keys[k] = quantization.constant_cost(some[0].constant)
         elif actions[k] == TrackAction.KEYED:
@@ -164,25 +162,23 @@ def _join(
     return FoundKeys(grid, tuple(free), actions, keys, on)
 
 
-def _joint_action(parts: Sequence[_PartKeys]) -> TrackAction:
+def _joint_action(parts: Sequence[_PartKeys], path: str) -> TrackAction:
     """The action of a track: dropped, or the same constant, if it is so in all parts; else keyed."""
     actions = {each.action for each in parts}
     if actions == {TrackAction.DROPPED}:
         return TrackAction.DROPPED
-    first = parts[0].constant
-    same = all((each.constant == first).all() or (each.constant == -first).all() for each in parts)
+    constants = np.array([each.constant for each in parts])
+    if path == "rotation":
+        constants = quaternion.align_signs(constants)
+    same = bool((constants == constants[0]).all())
     return TrackAction.CONSTANT if same and TrackAction.KEYED not in actions else TrackAction.KEYED
 
 
 def _joint_keys(parts: Sequence[_PartKeys], track: Track, coding: Encoding) -> EncodedKeys:
     """The keys of all parts, those where two meet once, in one format."""
-    pieces: list[Floats] = []
-    for each in parts:
-        values = each.values
-        if pieces and track.path == "rotation" and pieces[-1][-1] @ values[0] < 0:
-            values = -values
-        pieces.append(values[1:] if pieces else values)
-    joined = np.concatenate(pieces)
+    joined = np.concatenate([parts[0].values, *(each.values[1:] for each in parts[1:])])
+    if track.path == "rotation":
+        joined = quaternion.align_signs(joined)
     if is_closed(track):
         joined[-1] = -joined[0] if track.path == "rotation" and joined[-1] @ joined[0] < 0 else joined[0]
     return quantization.encode(joined, _joint_format(parts, joined, track.path, coding.packing))

@@ -89,7 +89,7 @@ def analyze_sources(
             ats[n],
             np.searchsorted(ats[n], grids[n]),
             moving[n],
-            _source_keys(_tracks_of(each), grids[n], is_part=each.grid is not None),
+            source_keys(_tracks_of(each), grids[n], is_part=each.grid is not None),
             answering,
             local.of_clip(n),
             world[:, n, : len(ats[n])],
@@ -168,8 +168,8 @@ def _max_chord_error(track: Track) -> float:
     return float(playback.arc_distance(playback.steps(track.values).max())) / 2
 
 
-def _source_keys(tracks: Sequence[Track], grid: Floats, *, is_part: bool) -> Bools:
-    """Mask (G, K) of the grid (K,) at the keys of G tracks; all for splines, and both ends of a part."""
+def source_keys(tracks: Sequence[Track], grid: Floats, *, is_part: bool) -> Bools:
+    """Return the mask (G, K) of the grid (K,) at the keys of G tracks; all for splines, and both ends of a part."""
     found = np.zeros((len(tracks), len(grid)), np.bool_)
     for i, track in enumerate(tracks):
         found[i] = track.interpolation is Interpolation.CUBICSPLINE

@@ -143,6 +143,23 @@ def test_nothing_is_searched_if_all_tracks_keep_the_sources_keys(monkeypatch: py
     assert [int(found.on[i].sum()) for i in range(2)] == [250, 250]
 
 
+def test_a_rotation_that_changes_its_sign_stays_constant() -> None:
+    sides = np.where(np.arange(len(TIMES)) >= 300, -1.0, 1.0)
+    what = clip(
+        track("rotation", TIMES, about("x", np.full(len(TIMES), 40.0)) * sides[:, None], node=1),
+        track("rotation", TIMES, turning(1.5, times=TIMES), node=2),
+    )
+    assert _found(what).actions.tolist() == [TrackAction.CONSTANT, TrackAction.KEYED]
+
+
+@pytest.mark.parametrize(("path", "expected"), [("rotation", TrackAction.CONSTANT), ("translation", TrackAction.KEYED)])
+def test_opposite_constants_are_one_rotation_and_two_places(path: str, expected: TrackAction) -> None:
+    value = np.array([0.0, 0.6, 0.8])
+    at, none = np.arange(2), np.zeros((2, 3))
+    parts = [long_clips._PartKeys(TrackAction.CONSTANT, sign * value, at, none, 0.1) for sign in (1, -1)]
+    assert long_clips._joint_action(parts, path) is expected
+
+
 def test_parts_meet_where_most_tracks_have_keys() -> None:
     times = np.arange(1001) / 64
     tracks = [track("translation", at, np.zeros((len(at), 3)), node=i) for i, at in enumerate((times, times[::60]))]
