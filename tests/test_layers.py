@@ -93,7 +93,7 @@ PUBLIC = {
     "measure.continuous_bound": "clip_groups largest_error prover sampled_clips",
     "measure.error": "error_curve metric point_matrix point_rows sample_times shell_points statistics surface",
     "measure.inspect": ("contents frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"),
-    "measure.loops": "clip_ends end_frames joint_gaps loop_analysis recommendations skin_motion",
+    "measure.loops": "clip_ends divided_ranges end_frames joint_gaps loop_analysis recommendations skin_motion",
     "optimization.search": "plan",
     "optimization.tracks": "clip_ends needed_keys",
     "show.filmstrip": "camera clips filmstrip frame_selection image_file",

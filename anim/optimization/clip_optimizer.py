@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.metric import ErrorMetric, MotionError, WholeScene
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
@@ -22,6 +22,7 @@ from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
 from anim.optimization.verification import Verification, verify_clips
+from anim.sampling.scene_parts import SceneDivider, ScenePart
 
 RETRY_FACTOR = 0.97  # applied to bound / measured error for the next search
 NEW_VERTEX_RETRY_FACTOR = 0.995  # the same if the worst vertex was not among the measured points
@@ -59,6 +60,7 @@ class ClipOptimizer:
 
     before, after: the scene in its original and in its new rest pose. clips: all of the file. detailed: whether
     verifications include statistics. verified: whether errors are measured; else every result passes, for its size.
+    whole: the optimizer of the whole file, if `before` and `after` are parts of its scenes.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class ClipOptimizer:
         *,
         detailed: bool = False,
         verified: bool = True,
+        whole: ClipOptimizer | None = None,
     ) -> None:
         self.request = request
         self.before = before
@@ -77,6 +80,7 @@ class ClipOptimizer:
         self.clips = clips
         self.detailed = detailed
         self.verified = verified
+        self._whole = whole
 
     def context(self, extra: frozenset[tuple[int, int]] = frozenset()) -> Context:
         """Return the search context; extra: additional points, (index of the surface, index of the vertex)."""
@@ -98,6 +102,27 @@ class ClipOptimizer:
             prover=self._prover,
         )
 
+    def on_part(self, clips: Sequence[Clip]) -> tuple[ScenePart, ClipOptimizer] | None:
+        """Return the part of the scene that clips move, with an optimizer of these clips on it; None if it isn't small.
+
+        All that is measured in metres or points of the whole scene stays so.
+        """
+        before, after = (each.part(clips) for each in self.dividers)
+        if before is None or after is None:
+            return None
+        index = {node: i for i, node in enumerate(before.nodes.tolist())}
+        policy = self.request.policy
+        keep = frozenset(index[node] for node in policy.keep if node in index)
+        return before, ClipOptimizer(
+            replace(self.request, policy=replace(policy, keep=keep)),
+            before.scene,
+            after.scene,
+            tuple(map(before.into, clips)),
+            detailed=self.detailed,
+            verified=self.verified,
+            whole=self,
+        )
+
     def worst_vertex(self, found: Verification) -> frozenset[tuple[int, int]]:
         """Return the vertex with the largest error, (index of the surface, index of the vertex).
 
@@ -109,7 +134,7 @@ class ClipOptimizer:
 
     def _context(self, extra: frozenset[tuple[int, int]]) -> Context:
         request = self.request
-        return build_context(
+        found = build_context(
             self.after,
             self.clips,
             bounds=request.bounds,
@@ -118,16 +143,29 @@ class ClipOptimizer:
             effort=EFFORTS[request.effort],
             extra=extra,
         )
+        return found if self._whole is None else replace(found, size=self._whole.context().size)
 
     @cached_property
     def _default_context(self) -> Context:
         return self._context(frozenset())
 
     @cached_property
+    def dividers(self) -> tuple[SceneDivider, SceneDivider]:
+        """Those of the scenes before and after."""
+        found = SceneDivider(self.before)
+        return found, found if self.after is self.before else SceneDivider(self.after)
+
+    @cached_property
+    def _diagonal(self) -> float:
+        return diagonal(self.before) if self._whole is None else self._whole._diagonal
+
+    @cached_property
     def _ruler(self) -> ErrorMetric:
-        fraction = self.request.bounds.shell / (diagonal(self.before) or 1.0)
+        fraction = self.request.bounds.shell / (self._diagonal or 1.0)
         shell = None if self.request.policy.drop_invisible else fraction
-        return ErrorMetric(self.before, self.after, shell=shell, clips=self.clips)
+        scene = (self if self._whole is None else self._whole).before
+        whole = WholeScene(self._diagonal, len(scene.skeleton), scene.vertex_count)
+        return ErrorMetric(self.before, self.after, shell=shell, clips=self.clips, whole=whole)
 
     @cached_property
     def _prover(self) -> Prover:
@@ -139,8 +177,21 @@ def optimize_clips(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) 
 
     items: of each clip, its number in the file and its task.
 
-    All are searched and verified side by side. The lossless version competes too: a few splines or steps can be smaller
-    than the lines that replace them.
+    All are searched and verified side by side, on the part of the scene that they move if that is small.
+    """
+    found = optimizer.on_part([task.clip for _, task in items])
+    if found is None:
+        return _optimize_all(optimizer, items)
+    part, smaller = found
+    tasks = [replace(task, clip=clip) for (_, task), clip in zip(items, smaller.clips, strict=True)]
+    results = _optimize_all(smaller, list(enumerate(tasks)))
+    return [replace(each, solution=replace(each.solution, clip=part.out_of(each.solution.clip))) for each in results]
+
+
+def _optimize_all(optimizer: ClipOptimizer, items: Sequence[tuple[int, Task]]) -> list[ClipResult]:
+    """The results of clips, whose numbers are those of the optimizer.
+
+    The lossless version competes too: a few splines or steps can be smaller than the lines that replace them.
     """
     steps = [_optimize(optimizer, number, task) for number, task in items]
     found: dict[int, ClipResult] = {}

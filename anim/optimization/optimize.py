@@ -14,12 +14,12 @@ from anim.measure.error.surface import has_vertices
 from anim.model import Clip, Scene
 from anim.optimization import writing
 from anim.optimization.clip import Task
+from anim.optimization.clip_batches import batch_clips
 from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, VerificationRequest, optimize_clips
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import rebase
 from anim.optimization.search.plan import Solution
-from anim.optimization.search.source_motion import key_grid
 from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.verification import Verification
@@ -27,9 +27,6 @@ from anim.optimization.writing import changed_clips, write_solutions
 from anim.sampling.times import SHORTER_CLIP, check_duration
 
 SEARCH_BOUND_FRACTION = 0.985  # of the bound, for the search; the rest covers errors outside its sample points
-BATCH_KEYS = 300  # times of possible keys, in all, of clips that are optimized side by side: twice as many are measured
-BATCH_MATRICES = 40_000  # those times × nodes
-BATCH_CLIPS = 16  # more would leave processes of `workers` without work
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +89,7 @@ def optimize(
         return reader.clip_label(clips[item[0]].name, item[0])
 
     found: dict[int, ClipResult] = {}
-    batches = _batches(distinct, len(scene.skeleton))
+    batches = batch_clips(distinct, optimizer.dividers[0])
     with process_pool(min(workers, len(batches)), optimizer, start=start) as pool:
         results = pool.each(optimize_clips, batches, label=lambda batch: name(batch[0]), work=_work)
         for batch, some in zip(batches, results, strict=True):
@@ -117,24 +114,6 @@ def _first_equal(tasks: Sequence[tuple[int, Task]]) -> list[int]:
         k if tasks[k][1].at_rest == task.at_rest else n
         for n, (k, (_, task)) in enumerate(zip(first, tasks, strict=True))
     ]
-
-
-def _batches(tasks: Sequence[tuple[int, Task]], nodes: int) -> list[list[tuple[int, Task]]]:
-    """The tasks in batches that are optimized side by side, of clips with about as many times, the longest first.
-
-    They depend on the clips alone, and not on the number of processes, so that the result does not either.
-    """
-    lengths = [len(key_grid(task.clip.tracks)) for _, task in tasks]
-    most = min(BATCH_KEYS, BATCH_MATRICES // max(nodes, 1))
-    batches: list[list[tuple[int, Task]]] = []
-    room = longest = 0
-    for n in sorted(range(len(tasks)), key=lambda n: (-lengths[n], tasks[n][0])):
-        if not batches or room < longest or len(batches[-1]) == BATCH_CLIPS:
-            batches.append([])
-            room, longest = most, lengths[n]
-        batches[-1].append(tasks[n])
-        room -= longest  # shorter ones are padded
-    return batches
 
 
 def _work(batch: Sequence[tuple[int, Task]]) -> float:

@@ -15,6 +15,7 @@ from anim.gltf.document import Document
 from anim.measure.inspect.frame_rate import GRID_TOLERANCE_FRAMES, estimate_frame_rate, usual_frame_rate
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import JointGap, joint_gaps
 from anim.model import Clip
 from anim.units import format_number
@@ -27,19 +28,26 @@ MIN_FRAMES = 2  # in it: the last one has the speed of the first one of the clip
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with a small loop gap, and those that loop by name and don't."""
-    for clip in file.facts.clips:
-        size = clip.seam_m / file.diagonal if file.diagonal else 0.0
-        is_near = size < parameters["limit"] or re.search(LOOP_NAME, clip.name) is not None
-        if is_near and size > parameters["gap"] and clip.duration_s > 0:
-            gaps = _gaps(file, clip.index) if clip.seam_measured_on == "skin" else []
-            yield file.in_clip(clip.index, value=size, time_s=clip.end_s, node=gaps[0].node if gaps else None)
+    sizes = {clip.index: clip.seam_m / file.diagonal if file.diagonal else 0.0 for clip in file.facts.clips}
+    found = [
+        clip
+        for clip in file.facts.clips
+        if (sizes[clip.index] < parameters["limit"] or re.search(LOOP_NAME, clip.name) is not None)
+        and sizes[clip.index] > parameters["gap"]
+        and clip.duration_s > 0
+    ]
+    gaps = _gaps(file, [clip.index for clip in found if clip.seam_measured_on == "skin"])
+    for clip in found:
+        joints = gaps.get(clip.index)
+        node = joints[0].node if joints else None
+        yield file.in_clip(clip.index, value=sizes[clip.index], time_s=clip.end_s, node=node)
 
 
-def _gaps(file: CheckedFile, number: int) -> list[JointGap]:
-    """The joints with a gap. The translation of a root that travels is none."""
-    clip = file.contents.clips[number]
-    whole = LoopRange(clip, clip.start, clip.end, root=root_motion_node(file.skeleton, clip))
-    return joint_gaps(file.motion, [whole])[0]
+def _gaps(file: CheckedFile, numbers: Sequence[int]) -> dict[int, list[JointGap]]:
+    """The joints of clips with a gap, by index of the clip. The translation of a root that travels is none."""
+    clips = [file.contents.clips[number] for number in numbers]
+    ranges = [LoopRange(each, each.start, each.end, root=root_motion_node(file.skeleton, each)) for each in clips]
+    return dict(zip(numbers, measure_on_parts(file.motion, ranges, joint_gaps), strict=True))
 
 
 def problem(found: Sequence[Occurrence]) -> str:

@@ -199,6 +199,9 @@ STILL = Statistics(0.0, 0.0, Peak(), Peak(), Peak())  # of equal clips
 
 def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player: str, fps: float) -> _Measured:
     ruler = prover.ruler
+    if (part := ruler.part(before, after)) is not None:
+        ruler, before, after = part
+        prover = Prover(ruler)
     look = ruler.sample_errors(before, after, times, players=(player,))
     error, bound = look.error, None
     if len(set(parse_pair(player))) == 1:

@@ -7,6 +7,7 @@ the length of a clip.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from itertools import starmap
 from typing import NamedTuple
 
@@ -29,6 +30,7 @@ from anim.measure.error.surface import NUM_CORNERS, Surface, diagonal, has_verti
 from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PosedSkeleton, PoseSampler
+from anim.sampling.scene_parts import SceneDivider
 from anim.sampling.weight_pointers import resolve_weight_pointers
 
 NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no vertex is searched
@@ -78,6 +80,14 @@ class ErrorSamples(NamedTuple):
     block: Block | None = None
 
 
+class WholeScene(NamedTuple):
+    """Diagonal in m, and numbers of nodes and vertices of a scene."""
+
+    diagonal: float
+    num_nodes: int
+    num_vertices: int
+
+
 class ErrorMetric:
     """Error metric for clips on one scene, or on two corresponding ones: prepares what all clips share.
 
@@ -87,6 +97,7 @@ class ErrorMetric:
     shell: as a fraction of the diagonal, the distance of six points around each node that moves no vertex; None ignores
     such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
     clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
+    whole: what `scene` is a part of; its other nodes don't move.
     num_static_points: number of vertices of rigid meshes, or of points of shells if there are none, on nodes that no
     clip moves: in no group.
     has_shell: whether there are such nodes, measured on a shell.
@@ -99,9 +110,10 @@ class ErrorMetric:
         *,
         shell: float | None = None,
         clips: Iterable[Clip] | None = None,
+        whole: WholeScene | None = None,
     ) -> None:
         self.scene, self.other = scene, other or scene
-        self.diagonal = diagonal(scene)
+        self.diagonal = diagonal(scene) if whole is None else whole.diagonal
         found = surfaces(scene) if has_vertices(scene) else []
         self.pairs: Correspondence = match_scenes(scene, self.other, found)
         if shell is None and not found and (self.pairs.nodes < 0).any():
@@ -124,8 +136,34 @@ class ErrorMetric:
             if not self.pairs.surfaces:
                 self.num_static_points = points[..., 0].size - sum(len(g) for each in around for g in each.groups)
             self.parts += [*groups, *around]
+        if whole is not None:
+            nodes_beside, vertices_beside = (
+                whole.num_nodes - len(scene.skeleton),
+                whole.num_vertices - scene.vertex_count,
+            )
+            self.num_static_points += vertices_beside if self.pairs.surfaces else nodes_beside * points.shape[1]
         self.combined = combine_groups(self.parts)
         self._recent = RecentSamplers()
+        self._shell, self._whole = shell, whole or WholeScene(self.diagonal, len(scene.skeleton), scene.vertex_count)
+
+    def part(self, before: Clip, after: Clip) -> tuple[ErrorMetric, Clip, Clip] | None:
+        """Return the metric of the part of the scenes that two clips move, with the clips for it.
+
+        None if the part is not small, or if not all nodes of the scenes have the same indices.
+        """
+        if not np.array_equal(self.pairs.nodes, np.arange(len(self.other.skeleton))):
+            return None
+        one, other = (each.part((before, after)) for each in self._dividers)
+        if one is None or other is None or not np.array_equal(one.nodes, other.nodes):
+            return None
+        clips = one.into(before), one.into(after)
+        metric = ErrorMetric(one.scene, other.scene, shell=self._shell, clips=clips, whole=self._whole)
+        return (metric, *clips) if np.array_equal(metric.pairs.nodes, np.arange(len(one.nodes))) else None
+
+    @cached_property
+    def _dividers(self) -> tuple[SceneDivider, SceneDivider]:
+        found = SceneDivider(self.scene)
+        return found, found if self.other is self.scene else SceneDivider(self.other)
 
     def _around_nodes(self, surfaces: Sequence[Surface], shell: float | None) -> tuple[Ints, Floats]:
         """The nodes (S,) that are measured at points (S, P, 3) around them, in their spaces.

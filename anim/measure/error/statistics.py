@@ -76,12 +76,13 @@ def statistics(
     for each in ruler.blocks(before, after, times, player=player) if block is None else [block]:
         angle = max(angle, _rotation_errors(ruler, each), key=lambda peak: peak.size)
         weight = max(weight, _weighted(ruler, each), key=lambda peak: peak.size)
-    found = [each for each in found if len(each)] or [np.zeros(1)]
+    zeros = ruler.num_static_points * len(chosen)
+    found = [each for each in found if len(each)] or [np.zeros(0 if zeros else 1)]
     every = found.pop() if len(found) == 1 else np.concatenate(found)
     found.clear()
     speed = speed_error(ruler, before, after, player=player, fps=fps, block=block)
-    mean = float(every.mean())
-    return Statistics(mean, _percentile(every, 0.99), angle, speed, weight)
+    mean = float(every.sum()) / (len(every) + zeros)
+    return Statistics(mean, _percentile(every, zeros, 0.99), angle, speed, weight)
 
 
 def speed_error(
@@ -137,10 +138,9 @@ def _take(block: Block, frames: Ints) -> Block:
 
 
 def _distances(ruler: ErrorMetric, block: Block) -> Iterator[Floats]:
-    """Distances of all vertices at all times of the block; without vertices, of the points of shells."""
+    """Distances of moving vertices at all times of the block; without vertices, of the points of shells."""
     frames = np.arange(len(block.times))
     surfaces = [part for part in ruler.parts if not _is_shell(part)]
-    yield np.zeros(ruler.num_static_points * len(frames))
     for part in surfaces if surfaces or ruler.pairs.surfaces else ruler.parts:
         field = part.field(block.old, block.new)
         if field is not None:
@@ -151,9 +151,12 @@ def _is_shell(part: PointGroups) -> bool:
     return isinstance(part, ShellPoints | MergedGroups) and not part.has_vertices
 
 
-def _percentile(values: Floats, share: float) -> float:
-    """The value below which this fraction of all is. values: reordered."""
-    place = min(int(np.ceil(share * len(values))), len(values)) - 1
+def _percentile(values: Floats, zeros: int, share: float) -> float:
+    """The value below which this fraction of all is, with so many zeros. values: not negative, reordered."""
+    count = len(values) + zeros
+    place = min(int(np.ceil(share * count)), count) - 1 - zeros
+    if place < 0:
+        return 0.0
     values.partition(place)
     return float(values[place])
 

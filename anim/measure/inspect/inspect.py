@@ -17,6 +17,7 @@ from anim.measure.inspect.report import ClipReport, Facts, SkinReport, TrackRepo
 from anim.measure.inspect.stored_bytes import stored_bytes as stored
 from anim.measure.inspect.track_statistics import TrackStats, stats
 from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Interpolation, Scene, Skeleton, TimeAxis, Track
@@ -77,7 +78,11 @@ def _seams(skin: SkinMotion, clips: list[Clip], groups: list[ConcatenatedTracks]
     """Loop gaps of whole clips, measured like those of `loop`."""
     roots = (root_motion.root_motion_node(skin.skeleton, clip) for clip in clips)
     parts = [LoopRange(clip, clip.start, clip.end, root=root) for clip, root in zip(clips, roots, strict=True)]
-    return measure_seams(skin, parts, groups)
+
+    def measure(motion: SkinMotion, some: Sequence[LoopRange]) -> list[Seam]:
+        return measure_seams(motion, some, groups if some is parts else None)
+
+    return measure_on_parts(skin, parts, measure)
 
 
 def _with_costs(

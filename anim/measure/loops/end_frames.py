@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import moving_nodes
 from anim.measure.loops.loop_criteria import (
     NOISE_PER_SIZE,
@@ -52,6 +53,10 @@ def find_end_frames(skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int
     if not len(skin.points):
         return [None] * len(clips)
     ranges = [_whole_range(clip, root) for clip, root in zip(clips, roots, strict=True)]
+    return measure_on_parts(skin, ranges, _find_end_frames)
+
+
+def _find_end_frames(skin: SkinMotion, ranges: Sequence[LoopRange]) -> list[EndFrame | None]:
     seams = measure_seams(skin, ranges)
     missing = [i for i, seam in enumerate(seams) if ranges[i].frame and _is_visible(skin, seam) and is_one_frame(seam)]
     duplicate = [i for i, seam in enumerate(seams) if _may_be_duplicate(ranges[i]) and _is_noise(skin, seam)]

@@ -18,7 +18,7 @@ from anim.sampling.clips import sample_clips
 
 
 class JointGap(NamedTuple):
-    """A joint with its own loop gap. joint: its name. node: its index.
+    """A joint with its own loop gap. joint: its name. node: its index in the whole scene.
 
     gap: m, the largest distance that any vertex would move if this joint alone ended as it starts.
     is_morph: whether it is a mesh with open morph weights.
@@ -52,11 +52,12 @@ def _by_clip(
     rows: list[list[JointGap]] = [[] for _ in weights]
     for i, node, gap in zip(clip.tolist(), nodes.tolist(), gaps.tolist(), strict=True):
         if gap > 0:
-            rows[i].append(JointGap(skin.skeleton.display_name(node), node, gap))
+            rows[i].append(JointGap(skin.skeleton.display_name(node), int(skin.nodes[node]), gap))
     for row, morphs in zip(rows, weights, strict=True):
         for node, each in morphs.items():
             if (change := _morphed(skin, node, each[1] - each[0])) > 0:
-                row.append(JointGap(skin.skeleton.display_name(node), node, change, is_morph=True))
+                name, number = skin.skeleton.display_name(node), int(skin.nodes[node])
+                row.append(JointGap(name, number, change, is_morph=True))
         row.sort(key=lambda each: (-each.gap, each.node))
     return rows
 
@@ -70,7 +71,7 @@ def moving_nodes(skin: SkinMotion, parts: Sequence[LoopRange]) -> list[set[int]]
         (first, second, before_last, last), _ = _sample(skin, some, times)
         roots = np.array([each.root for each in some])
         moves = carrying & (_is_moved(first, second, roots) | _is_moved(before_last, last, roots))
-        found += [set(np.flatnonzero(each).tolist()) for each in moves]
+        found += [set(skin.nodes[each].tolist()) for each in moves]
     return found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import JointGap, moving_nodes
 from anim.measure.loops.loop_criteria import (
     NOISE_PER_SIZE,
@@ -91,7 +92,8 @@ def analyze_loops(skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int])
     and they jump no further than the clip moves from frame to frame. Open by one frame: the gap is about the next
     frame's motion. roots: nodes whose displacement is ignored, −1 for none.
     """
-    return _judge(skin, [LoopRange(each, each.start, each.end, root=i) for each, i in zip(clips, roots, strict=True)])
+    ranges = [LoopRange(each, each.start, each.end, root=i) for each, i in zip(clips, roots, strict=True)]
+    return measure_on_parts(skin, ranges, _judge)
 
 
 def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:

@@ -17,6 +17,7 @@ from anim.measure.loops.clip_ends import EndPoses, LoopRange
 from anim.model import Clip, Scene
 from anim.sampling.clips import sample_world_matrices
 from anim.sampling.pose import rest_world, sample_pose
+from anim.sampling.scene_parts import SceneDivider, ScenePart
 from anim.sampling.world import world_by_node
 
 MOTION = np.array([-1.0, 1])  # weights of two frames: the motion between them
@@ -31,19 +32,32 @@ class SkinMotion:
     Gaps and steps are measured on all of them, long time ranges (`places`) on the outermost ones of each joint. In a
     scene without vertices all nodes count, with six points around each; otherwise nodes that move no vertex (IK
     controls, cameras) do not count.
+
+    nodes: (N,) indices of the skeleton's nodes in the whole scene. whole: the motion of that, if `scene` is a part.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, *, nodes: Ints | None = None, whole: SkinMotion | None = None) -> None:
         self.skeleton = scene.skeleton
-        self._scene = scene
+        self.nodes = np.arange(len(scene.skeleton)) if nodes is None else nodes
+        self._scene, self._whole = scene, whole
         self.is_skin = has_vertices(scene)
         self.surfaces = surfaces(scene) if self.is_skin else []
         self.rest_world = rest_world(scene.skeleton)[:, None]
-        self._lever = (
-            orientation_probes.PROBE_DISTANCE * orientation_probes.probe_size(self.rest_world[..., 3])
-            if len(scene.skeleton)
-            else 0.0
-        )
+        self._lever: float = self._find_lever() if whole is None else whole._lever
+
+    def part(self, found: ScenePart) -> SkinMotion:
+        """Return the motion of a part of the scene, in which sizes are those of the whole."""
+        return SkinMotion(found.scene, nodes=self.nodes[found.nodes], whole=self)
+
+    @cached_property
+    def divider(self) -> SceneDivider:
+        """That of the scene."""
+        return SceneDivider(self._scene)
+
+    def _find_lever(self) -> float:
+        if not len(self.skeleton):
+            return 0.0
+        return orientation_probes.PROBE_DISTANCE * orientation_probes.probe_size(self.rest_world[..., 3])
 
     @cached_property
     def points(self) -> PointMatrix:
@@ -54,7 +68,9 @@ class SkinMotion:
 
     @cached_property
     def size(self) -> float:
-        """Diagonal of the scene's bounding box in the rest pose, in metres; 1 without one."""
+        """Diagonal of the whole scene's bounding box in the rest pose, in metres; 1 without one."""
+        if self._whole is not None:
+            return self._whole.size
         return orientation_probes.probe_size(self.points.places(self.rest_world)) if len(self.points) else 1.0
 
     @cached_property
