@@ -11,6 +11,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 
+MIN_ANGLE = 1e-20  # rad, instead of 0 between equal rotations: sines of it and of its parts are these themselves
 SMALL_SINE = 1e-8  # below this |xyz| the angle equals its sine in float64
 
 
@@ -60,14 +61,13 @@ def slerp(a: Floats, b: Floats, u: Floats | float) -> Floats:
     u: (...), 0 gives a and 1 gives b or −b, exactly; outside 0 … 1 the rotation continues along the same arc.
     The sign of b changes where dot(a, b) < 0, so results are in a's hemisphere. At dot(a, b) = 0 b keeps its sign.
     slerp([0, 0, 0, 1], [0, 0, 1, 0], 0.5) → [0, 0, √½, √½]
-    Source: Shoemake 1985; sin(uθ)/sin θ = u·sinc(uθ)/sinc θ is stable at θ = 0, and θ ≤ 90° keeps sin θ away from 0.
+    Source: Shoemake 1985; θ ≤ 90° keeps sin θ away from 0 but for equal rotations, where MIN_ANGLE gives 1 − u and u.
     """
     u = np.asarray(u, dtype=np.float64)
     b = _align_sign(a, b)
-    theta = 2 * np.arctan2(_length(b - a), _length(b + a))
-    whole = np.sinc(theta / np.pi)
-    of_a = (1 - u) * np.sinc((1 - u) * theta / np.pi) / whole
-    of_b = u * np.sinc(u * theta / np.pi) / whole
+    theta = np.maximum(2 * np.arctan2(_length(b - a), _length(b + a)), MIN_ANGLE)
+    whole = np.sin(theta)
+    of_a, of_b = np.sin((1 - u) * theta) / whole, np.sin(u * theta) / whole
     return np.asarray(of_a[..., None] * a + of_b[..., None] * b)
 
 

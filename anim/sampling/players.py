@@ -98,9 +98,9 @@ def _mix(player: PlayerModel, keys: Floats, left: Ints, u: Floats) -> Floats:
     if not u.any():  # all at keys
         mixed = a[left]
     elif theta.any():
-        angle = (theta / np.pi)[left]
-        whole = np.sinc(angle)
-        of_a, of_b = (1 - u) * np.sinc((1 - u) * angle) / whole, u * np.sinc(u * angle) / whole
+        theta = np.maximum(theta, quaternion.MIN_ANGLE)
+        angle, whole = theta[left], np.sin(theta)[left]
+        of_a, of_b = np.sin((1 - u) * angle) / whole, np.sin(u * angle) / whole
         mixed = of_a[..., None] * a[left] + of_b[..., None] * b[left]
     else:
         mixed = (1 - u)[..., None] * a[left] + u[..., None] * b[left]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Bools, Floats
+from anim.maths import quaternion
 from anim.measure.continuous_bound.cubic_bounds import with_cubics
 from anim.measure.continuous_bound.derivative_bounds import derivative_bound, product
 from anim.measure.continuous_bound.difference_bounds import difference_bounds
@@ -60,7 +61,8 @@ def _same(first: RotationEndpoints, second: RotationEndpoints) -> Bools:
 def _arc_bounds(of: RotationEndpoints, h: Floats) -> tuple[QuaternionBounds, ChordBounds]:
     """Bounds of quaternions, and their mixes as lines. h: (L,) s."""
     start, end = of.value
-    sine, cosine = 1 / (h * np.sinc(of.turn / np.pi)), np.cos(of.turn)
+    turn = np.maximum(of.turn, quaternion.MIN_ANGLE)
+    sine, cosine = turn / (h * np.sin(turn)), np.cos(of.turn)
     mixed = arc_mix(of.value, np.stack(((end - cosine * start) * sine, (cosine * end - start) * sine)))
     found, chord = slerp_bounds(mixed, of.turn, h), chord_bounds(mixed, h)
     players = np.flatnonzero((of.unit & ~of.is_cubic).any(axis=1))

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anim.arrays import Bools, Floats
+from anim.maths import quaternion
 from anim.measure.continuous_bound.endpoints import of_batch
 from anim.measure.continuous_bound.node_tracks import NodeTracks, pairs_of
 from anim.model import Interpolation
@@ -122,13 +123,13 @@ def _stored_for(of: _Keys, players: Sequence[str]) -> tuple[Floats, Floats]:
 
 def _blend(a: Floats, b: Floats, angle: Floats, shares: Floats) -> Floats:
     """Mixes (2, 4, P, L) of quaternions (4, P, L) with `angle` (P, L), at parameters (2, L)."""
-    angle = angle / np.pi
-    whole = np.sinc(angle)
+    angle = np.maximum(angle, quaternion.MIN_ANGLE)
+    whole = np.sin(angle)
     result = np.empty((2, *a.shape))
     for k, u in enumerate(shares):
         if not (u - k).any():  # the keys themselves
             result[k] = (a, b)[k]
             continue
-        np.multiply((1 - u) * np.sinc((1 - u) * angle) / whole, a, out=result[k])
-        result[k] += (u * np.sinc(u * angle) / whole) * b
+        np.multiply(np.sin((1 - u) * angle) / whole, a, out=result[k])
+        result[k] += (np.sin(u * angle) / whole) * b
     return result

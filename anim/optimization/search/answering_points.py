@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats, Ints
+from anim.arrays import AnyArray, Floats, Ints, unique_sorted
 from anim.maths.hierarchy import find_subtrees
 from anim.measure.error.point_matrix import CARRIED, PointMatrix
 
@@ -74,7 +74,7 @@ class AnsweringPoints:
         some = slice(*np.searchsorted(self._sorted, (first, end)))
         near = self._point[some]
         if self._joint.shape[1] > 1:
-            near = np.unique(near)
+            near = unique_sorted(near)
         joint = self._joint[near]
         share = (self._weight[near] * ((first <= joint) & (joint < end))).sum(axis=1)
         return np.asarray(near[share > CARRIED if (share > CARRIED).any() else share > 0])

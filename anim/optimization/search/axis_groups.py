@@ -10,6 +10,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 
 MAX_SMALL_VALUES = 3000  # keys of all rows up to which numbers of keys are counted in log2(K) steps
+STEPS_AT_ONCE = 4  # from key to key, before it is asked whether all rows have ended; further ones change nothing
 MAX_STACKED_VALUES = 1_000_000  # pairs of groups × keys of the clips whose tracks are grouped at once
 
 Reaches: TypeAlias = tuple[Ints, Floats]
@@ -41,10 +42,13 @@ def num_keys(reach: Ints, last: Ints) -> Ints:
 
 def _count_by_steps(reach: Ints, first: Ints, end: Ints) -> Ints:
     """The numbers of keys of rows that start at `first`, from key to key."""
-    at, count = np.zeros_like(first), np.ones_like(first)
-    while (going := at < end).any():
-        at = reach[first + at]
-        count += going
+    ahead = (reach.reshape(len(first), -1) + first[:, None]).reshape(-1)
+    at, last, count = first, first + end, np.ones_like(first)
+    while (going := at < last).any():
+        for _ in range(STEPS_AT_ONCE):
+            count += going
+            at = ahead[at]
+            going = at < last
     return count
 
 

@@ -119,7 +119,7 @@ class BoundUsage:
         """The bound usage (P, b) against the columns `name` of the source."""
         usage = np.empty((len(self._clips.points), len(clips)))
         is_single = self._is_single[clips]
-        for single in np.unique(is_single).tolist():
+        for single in sorted(set(is_single.tolist())):
             some = np.flatnonzero(is_single == single)
             source = self._single_source if single else self._source
             parts = [take_clips(part, some, 2) for part in shown]

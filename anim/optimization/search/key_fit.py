@@ -109,7 +109,7 @@ class KeyFit:
         from scipy.linalg import solveh_banded
 
         found = np.zeros_like(right)
-        for axis in np.unique(axis_of[is_long]).tolist():
+        for axis in sorted(set(axis_of[is_long].tolist())):
             mine, count = np.flatnonzero(axis_of == axis), int(self._axes.counts[axis])
             some = right[:, mine, :count]
             bands = np.zeros((2, count))

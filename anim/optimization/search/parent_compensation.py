@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Floats, Ints, unique_sorted
 from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.model import Skeleton
@@ -47,7 +47,7 @@ class ParentCompensation:
         turning = np.flatnonzero(clips.path == ROTATION)
         tracks[clips.node[turning], clips.clip[turning]] = turning
         needed = np.zeros(len(skeleton), np.bool_)
-        for nodes in required_levels(skeleton, np.unique(clips.node[turning])):
+        for nodes in required_levels(skeleton, unique_sorted(clips.node[turning])):
             needed[nodes] = True
         chosen = [nodes[needed[nodes]] for nodes in clips.levels]
         self._levels = [_Level(nodes, skeleton.parents[nodes], tracks[nodes]) for nodes in chosen if len(nodes)]

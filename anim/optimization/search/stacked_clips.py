@@ -60,7 +60,10 @@ class StackedClips:
         self.weights[:, 0] = self.weights[np.arange(len(sources)), np.array(lengths) - 1] = END_WEIGHT
         self.moving, self.row = np.unique(self.node, return_inverse=True)
         self.local = tuple(self._padded(sources, path, self.moving) for path in range(len(PATHS)))
-        others = np.setdiff1d(np.concatenate(required_levels(skeleton, points.nodes) or [self.moving]), self.moving)
+        needed = np.zeros(len(skeleton), np.bool_)
+        needed[np.concatenate(required_levels(skeleton, points.nodes) or [self.moving])] = True
+        needed[self.moving] = False
+        others = np.flatnonzero(needed)
         is_still = _are_constant(sources, others)
         self.varying, self.constant = others[~is_still], others[is_still]
         varying = [self._padded(sources, path, self.varying) for path in range(len(PATHS))]
@@ -120,7 +123,9 @@ def _local_matrices(skeleton: Skeleton, local: Sequence[Floats], nodes: Ints) ->
     shape = local[0].shape[1:]
     frames = shape[1] * shape[2]
     found = matrix.from_trs(*(np.moveaxis(part.reshape(len(part), shape[0], frames), 0, 2) for part in local))
-    inside = np.isin(skeleton.sheared, nodes)
+    chosen = np.zeros(len(skeleton), np.bool_)
+    chosen[nodes] = True
+    inside = chosen[skeleton.sheared]
     found[np.searchsorted(nodes, skeleton.sheared[inside])] = skeleton.sheared_local[inside, None]
     columns: Floats = found.transpose(0, 3, 2, 1)
     return columns.reshape(shape[0], 4, 3, *shape[1:])
