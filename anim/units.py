@@ -15,10 +15,13 @@ _ZERO = r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*"
 _ZERO_ANGLE = r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*"
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+MIN_EXPONENT_VALUE = 1e15  # more digits than a double has; 1e300 would be a line of 301
 
 
 def format_number(value: float, digits: int) -> str:
-    """Return the value rounded to `digits` significant digits, without exponent: "0.41", "102", "1200"."""
+    """Return the value rounded to `digits` significant digits: "0.41", "102", "1200", and from 1e15 on "1.5e+15"."""
+    if abs(value) >= MIN_EXPONENT_VALUE:
+        return f"{value:.{digits}g}"
     rounded = f"{float(f'{value:.{digits}g}'):.10f}"
     return rounded.rstrip("0").rstrip(".")
 

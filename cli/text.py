@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from anim.units import format_number
+from anim.units import MIN_EXPONENT_VALUE, format_number
 from cli.streams import step_streams
 from cli.tables import cut_middle, escape_control
 
@@ -102,7 +102,7 @@ def format_time(seconds: float) -> str:
 
 def format_instant(seconds: float) -> str:
     """Return a time in a clip rounded to 1 ms, also of a late clip: "0.267 s", "5001.8 s"."""
-    return f"{f'{seconds:.3f}'.rstrip('0').rstrip('.')} s"
+    return f"{_without_zeros(seconds, 3)} s"
 
 
 def format_span(start: float, end: float) -> str:
@@ -112,7 +112,14 @@ def format_span(start: float, end: float) -> str:
 
 
 def _round_significant(seconds: float) -> str:
-    return f"{seconds:.4f}".rstrip("0").rstrip(".")
+    return _without_zeros(seconds, 4)
+
+
+def _without_zeros(value: float, decimals: int) -> str:
+    """The value with up to so many decimals, or an exponent where these have no meaning."""
+    if abs(value) >= MIN_EXPONENT_VALUE:
+        return f"{value:.4g}"
+    return f"{value:.{decimals}f}".rstrip("0").rstrip(".")
 
 
 def format_duration(seconds: float) -> str:

@@ -68,7 +68,7 @@ LAZY |= {"mujoco", "pxr", "alembic3d", "imath", "dask", "distributed", "rapier3d
 # The modules of sub-packages that other packages may import; all others are internal to theirs.
 PUBLIC = {
     "caches.formats": "flipbook_reader gltf mesh_sequence usd_losses usd_face_materials usd_materials usd_stage",
-    "caches.source_document": "bake_source lit_meshes shading_normals still_source",
+    "caches.source_document": "bake_source lit_meshes shading_normals single_clip_sources still_source",
     "caches.transforms": "resample statistics up_axis vertex_order",
     "caches.vat": "presets",
     "check.rules": "invalid",

@@ -189,7 +189,10 @@ def _format_errors(kinds: type[AnimError] | tuple[type[AnimError], ...]) -> Iter
 def _of(ending: str) -> CacheFormat:
     found = CACHE_FORMATS.get(ending.lower())
     if found is None:
-        raise UnsupportedError(f"unsupported cache format '{ending}' (expected {', '.join(CACHE_FORMATS)})")
+        raise UnsupportedError(
+            f"unsupported cache format '{ending}' (expected {', '.join(CACHE_FORMATS)})",
+            help="gltf-anim from-euler makes glTF of BVH" if ending.lower() == ".bvh" else "",
+        )
     return found
 
 

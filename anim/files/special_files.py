@@ -28,15 +28,18 @@ def descriptor_of(path: Path) -> int | None:
 
     Also of a link to such a path, and of other spellings: //dev/stdout.
     """
-    folders = {os.path.realpath(each) for each in DESCRIPTOR_FOLDERS}
     for each in _followed(str(path)):
         folder, name = os.path.split(each)
-        folder = os.path.realpath(folder).replace("//", "/")  # POSIX keeps two slashes at the start
-        if folder == "/dev" and name in STANDARD_STREAMS:
+        if name in STANDARD_STREAMS and _real(folder) == "/dev":
             return STANDARD_STREAMS[name]
-        if folder in folders and name.isascii() and name.isdigit() and len(name) < 10:
+        if name.isascii() and name.isdigit() and len(name) < 10 and _real(folder) in map(_real, DESCRIPTOR_FOLDERS):
             return int(name)
     return None
+
+
+def _real(folder: str) -> str:
+    """The folder that a path leads to. It takes a call of the system per part: only for names that may be special."""
+    return os.path.realpath(folder).replace("//", "/")  # POSIX keeps two slashes at the start
 
 
 def _followed(path: str) -> Iterator[str]:

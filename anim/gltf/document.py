@@ -23,6 +23,7 @@ class Buffer:
     byte_length: as in the JSON; the data may be longer, never shorter.
     uri: as in the JSON; None for the BIN chunk of a GLB, or for a buffer without data.
     replaced: True if the bytes are new; the uri then only tells how the buffer was stored before.
+    shortened: the buffer that this one has the bytes of, and the ranges (first byte, end) of it that are dropped.
     """
 
     def __init__(
@@ -33,10 +34,12 @@ class Buffer:
         *,
         where: str = "buffer",
         replaced: bool = False,
+        shortened: tuple[Buffer, list[tuple[int, int]]] | None = None,
     ) -> None:
         self.byte_length = byte_length
         self.uri = uri
         self.replaced = replaced
+        self.shortened = shortened
         self._load = load
         self._where = where
 

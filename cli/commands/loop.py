@@ -69,7 +69,8 @@ def command(
     between its end and its start, measured on the skin, without root motion. Nodes that move no vertex, such as IK
     controls, are ignored unless no mesh has vertices. For comparison, "frame step" is the largest motion from one frame
     to the next, and "velocity step" the largest change of velocity at a key inside the clip: a much smaller gap is
-    hardly visible.
+    hardly visible. "seconds" are those of the first and the last key, "at" is the node with the largest gap, or the
+    joints that are open, and "root motion" is the distance between both ends of the path of the root.
 
     With OUT, a clip that is open by one frame gets the missing frame, in which root motion continues. --blend closes
     any gap of value and velocity; if only some joints are open, it changes only these. --find lists the time ranges

@@ -21,8 +21,10 @@ from anim.files import resolver
 from anim.model import VertexCache
 from anim.units import plural
 from cli.errors import UsageError
-from cli.io import cache_folders, documents
+from cli.io import cache_folders, depfile, documents
 from cli.text import Reporter
+
+BVH = ".bvh"  # motion of joints, for other commands
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,10 @@ def check(path: str, ending: str | None = None, placeholders: Sequence[str] | No
         )
     found = ending or own or (".npz" if path == documents.PIPE else "")
     if found not in CACHE_FORMATS:
-        raise UsageError(f"{path}: unsupported cache format '{found}' (expected {', '.join(CACHE_FORMATS)})")
+        raise UsageError(
+            f"{path}: unsupported cache format '{found}' (expected {', '.join(CACHE_FORMATS)})",
+            help="gltf-anim to-euler writes BVH" if found == BVH else "",
+        )
     return found
 
 
@@ -135,6 +140,8 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
             if not dry_run and is_pipe:
                 cache_folders.to_stdout(staged)
             elif not dry_run:
+                if staged.main not in names:  # a file a frame: a rule of the name itself would always be out of date
+                    depfile.add_output(path, os.path.join(os.path.dirname(path), min(names)))
                 staged.commit()
         except OSError as error:
             raise not_written(away if is_pipe else path, error) from None

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+
+# With these make takes the line for two lines, a variable, a recipe, or the start of what is needed only first.
+UNESCAPABLE = {"\n": "a line break", "\r": "a line break", "=": "'='", ";": "';'", "|": "'|'"}
 
 
 class FileRecord:
@@ -13,7 +17,7 @@ class FileRecord:
 
     def __init__(self) -> None:
         self.inputs: dict[str, None] = {}  # in order
-        self.outputs: dict[str, None] = {}
+        self.outputs: dict[str, str] = {}  # files of rules, by the names of outputs
 
 
 _record: ContextVar[FileRecord | None] = ContextVar("files", default=None)
@@ -36,10 +40,10 @@ def add_inputs(*paths: Path) -> None:
         record.inputs.update(dict.fromkeys(map(str, paths)))
 
 
-def add_output(path: str) -> None:
-    """Record a file that was written."""
+def add_output(path: str, written: str = "") -> None:
+    """Record a file that was written. written: the file itself where none has the name of the output."""
     if (record := _record.get()) is not None:
-        record.outputs[path] = None
+        record.outputs[path] = written or path
 
 
 def rule(outputs: Sequence[str], inputs: Sequence[str]) -> str:
@@ -49,14 +53,22 @@ def rule(outputs: Sequence[str], inputs: Sequence[str]) -> str:
     rule(["a b.glb"], ["in.gltf"]) → "a\\\\ b.glb: in.gltf\\nin.gltf:"
     """
     needed = [each for each in inputs if each not in outputs]
-    rule = f"{' '.join(map(escape, outputs))}:{''.join(f' {escape(each)}' for each in needed)}\n"
-    return rule + "".join(f"{escape(each)}:\n" for each in needed)
+    rule = f"{' '.join(map(escape_target, outputs))}:{''.join(f' {escape(each)}' for each in needed)}\n"
+    return rule + "".join(f"{escape_target(each)}:\n" for each in needed)
+
+
+def escape_target(path: str) -> str:
+    """Return a path escaped as a target, of which make takes a % for a pattern, but not among what it needs.
+
+    escape_target("50%.glb") → "50\\%.glb"
+    """
+    return re.sub(r"(\\*)%", r"\1\1\\%", escape(path))
 
 
 def escape(path: str) -> str:
     """Return a path with spaces, #, $ and colons, but for that of a drive, escaped, as compilers do.
 
-    A line break can't be escaped.
+    Those of `UNESCAPABLE` can't be escaped.
     """
     words = []
     for i, character in enumerate(path):

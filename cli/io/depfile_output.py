@@ -59,11 +59,12 @@ def invoke(command: Callable[[], Any], path: str, output: str, *, dry_run: bool)
 
 def _rule(path: str, output: str, record: depfile.FileRecord) -> str:
     _refuse_inputs(path, record.inputs)
-    outputs = list(record.outputs) if "{" in output else [output]
+    outputs = list(record.outputs.values()) if "{" in output else [record.outputs.get(output, output)]
     inputs = list(record.inputs)
     for name in (*outputs, output, *inputs):
-        if "\n" in name or "\r" in name:
-            raise UsageError(f"{name!r}: a rule of --depfile can't hold a name with a line break")
+        for character, words in depfile.UNESCAPABLE.items():
+            if character in name:
+                raise UsageError(f"{name!r}: a rule of --depfile can't hold a name with {words}")
     return depfile.rule(outputs or [output], inputs)
 
 

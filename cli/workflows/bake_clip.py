@@ -117,7 +117,9 @@ def onto_source(
 
     clip: index of its clip. Raises RangeError for vertices that do not fit.
     """
-    document = prepare_source(source, {each.mesh for each in baked_meshes(cache, source.document)}, output)
+    document = prepare_source(
+        source.document, source, {each.mesh for each in baked_meshes(cache, source.document)}, output
+    )
     if "tangents" in CACHE_FORMATS[output.ending].holds:
         cache = with_shading_normals(cache, document)
     return cache, BakeSource(document, clip, keep_skeleton=keep_skeleton)
@@ -130,14 +132,14 @@ def choose_clip(source: Source, globs: Sequence[str] | None) -> int | None:
     return chosen[0] if len(chosen) == 1 else None
 
 
-def prepare_source(source: Source, meshes: set[int], output: Output) -> Document:
-    """Return the document of a source with its images inside, or for a .gltf with images valid in its folder.
+def prepare_source(document: Document, source: Source, meshes: set[int], output: Output) -> Document:
+    """Return a document of a source with its images inside, or for a .gltf with images valid in its folder.
 
     There they are copied to if it is another folder. Meshes are without Draco data.
     """
     if output.ending != ".gltf":
-        return self_contained(source.document, source, meshes)
-    document = decode_draco(source.document, meshes)
+        return self_contained(document, source, meshes)
+    document = decode_draco(document, meshes)
     if source.folder is None or source.is_in_folder(output.path):
         return document
     document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(output.path)).parent)

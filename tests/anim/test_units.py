@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from anim.errors import RangeError
-from anim.units import parse_angle, parse_fraction, parse_length, plural
+from anim.units import format_number, parse_angle, parse_fraction, parse_length, plural
+from cli.text import format_instant, format_length, format_time
 
 
 def test_a_number_beyond_float64_is_refused() -> None:
@@ -24,3 +25,9 @@ def test_a_number_beyond_float64_is_refused() -> None:
 def test_a_count_has_its_noun_in_the_singular_or_plural() -> None:
     assert [plural(count, "clip") for count in (0, 1, 2)] == ["0 clips", "1 clip", "2 clips"]
     assert [plural(count, "vertex", "vertices") for count in (1, 2)] == ["1 vertex", "2 vertices"]
+
+
+@pytest.mark.parametrize(("value", "text"), [(1e300, "1e+300"), (-3.4e38, "-3.4e+38"), (123_456_789.0, "123000000")])
+def test_numbers_without_meaningful_digits_have_an_exponent(value: float, text: str) -> None:
+    assert format_number(value, 3) == text
+    assert all(len(each(value)) < 16 for each in (format_length, format_time, format_instant) if value > 0)

@@ -178,3 +178,11 @@ def test_uneven_frames_get_an_advice(fixture: Fixture, call: Call, tmp_path: Pat
     assert "even steps" in refusal(run, 2)
     assert "--fps" in help_line(run)
     call("convert-cache", tmp_path / "a.npz", tmp_path / "a.pc2", "--fps", "10").product()
+
+
+def test_bvh_is_sent_to_its_own_commands(call: Call, tmp_path: Path, walk: Path) -> None:
+    (tmp_path / "walk.bvh").write_text("HIERARCHY")
+    run = call("convert-cache", tmp_path / "walk.bvh", tmp_path / "out.npz")
+    assert "unsupported cache format '.bvh'" in refusal(run, 4)
+    assert help_line(run) == "gltf-anim from-euler makes glTF of BVH"
+    assert help_line(call("convert-cache", walk, tmp_path / "out.bvh")) == "gltf-anim to-euler writes BVH"

@@ -159,6 +159,24 @@ def test_a_name_that_a_rule_cannot_hold_is_refused(folder: Path, call: Call) -> 
         assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.parametrize("character", ["=", ";", "|"])
+def test_a_name_that_make_takes_apart_is_refused(character: str, folder: Path, call: Call) -> None:
+    run = call("retime", "noop.glb", f"out{character}1.glb", "--speed", "2", "--depfile", "x.d")
+    assert f"can't hold a name with '{character}'" in refusal(run, 2)
+    assert not (folder / "x.d").exists()
+
+
+def test_a_sequence_is_named_by_its_first_frame(folder: Path, call: Call) -> None:
+    """No file has the name of OUT: a rule for it would always be out of date."""
+    call("bake", "crowd/arm 1.glb", "out.ply", "--clip", "bend", "--fps", "2", "--depfile", "x.d").product()
+    name = min(path.name for path in folder.glob("out*.ply"))
+    assert Path("x.d").read_text() == rule(name, r"crowd/arm\ 1.glb")
+    call("bake", "crowd/arm 1.glb", "{clip}.ply", "--fps", "2", "--depfile", "x.d").product()
+    names = Path("x.d").read_text().partition(":")[0].split()
+    assert len(names) == 2
+    assert all((folder / each).exists() for each in names)
+
+
 def test_none_is_written_without_an_output(folder: Path, call: Call) -> None:
     assert call("retime", "noop.glb", "out.glb", "--speed", "2", "--depfile", "x.d", "--dry-run").code == 0
     assert call("trim", "none.glb", "out.glb", "--to", "0.5", "--depfile", "x.d").code == 3
@@ -212,6 +230,22 @@ def test_make_reads_a_rule_of_names_with_colons(folder: Path) -> None:
     assert "up to date" in _built("make")
     _change(Path("walk:1.glb"))
     assert "gltf-anim convert" in _built("make")
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_reads_a_rule_of_names_with_percent_signs(folder: Path) -> None:
+    """A target with one is a pattern rule, whose inputs make forgets; among inputs a backslash would stay."""
+    (folder / "noop.glb").rename("50%.glb")
+    line = "gltf-anim convert 50%.glb out%.glb --depfile out.d"
+    Path("Makefile").write_text(f"all: out%.glb\nout\\%.glb:\n\t{line}\n-include out.d\n")
+    _built("make")
+    assert Path("out.d").read_text() == "out\\%.glb: 50%.glb\n50\\%.glb:\n"
+    assert "Nothing to be done" in _built("make")
+    _change(Path("50%.glb"))
+    assert "gltf-anim convert" in _built("make")
+    (folder / "50%.glb").rename("60%.glb")
+    Path("Makefile").write_text(Path("Makefile").read_text().replace("50%", "60%"))
+    assert "60%" in _built("make")
 
 
 @pytest.mark.skipif(shutil.which("ninja") is None, reason="ninja is not installed")

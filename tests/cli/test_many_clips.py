@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from anim.gltf.writing import references
 from anim.measure.inspect import frame_rate, storage_cost
 from anim.show.plots import polylines, track_selection
 from anim.skinning import chunk_pipeline
@@ -137,3 +138,29 @@ def test_the_source_of_textures_is_prepared_once_for_all_clips(
         mesh = Path(f"{path}-mesh.glb").read_bytes()
         assert (tmp_path / f"c{i}.png-mesh.glb").read_bytes() == mesh
         assert "animations" not in opened(mesh).json
+
+
+def test_each_file_of_a_clip_is_made_from_a_document_without_the_others(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that is gone through for a file, which was every clip: the references of documents, counted in values."""
+
+    def values(clips: int) -> int:
+        (tmp_path / "in.glb").write_bytes(many.clips_different(clips))
+        with monkeypatch.context() as patch:
+            counted = count_calls(patch, references, "_collect_unknown")
+            call("bake", tmp_path / "in.glb", tmp_path / "{clip}.glb", "--rigid").product()
+        return len(counted)
+
+    few, twice = values(16), values(32)
+    assert twice < 2.4 * few  # N log N: 2.25 times; the square would be 4 times
+
+
+@pytest.mark.parametrize("suffix", ["glb", "gltf"])
+def test_files_of_clips_are_those_of_a_source_with_one_clip(suffix: str, call: Call, tmp_path: Path) -> None:
+    (tmp_path / "in.glb").write_bytes(many.clips_different(5))
+    call("bake", tmp_path / "in.glb", tmp_path / f"{{clip}}.{suffix}", "--rigid").product()
+    for i in range(5):
+        (tmp_path / "one").mkdir(exist_ok=True)
+        call("bake", tmp_path / "in.glb", tmp_path / "one" / f"c{i}.{suffix}", "--rigid", "--clip", f"#{i}").product()
+        assert (tmp_path / f"c{i}.{suffix}").read_bytes() == (tmp_path / "one" / f"c{i}.{suffix}").read_bytes()

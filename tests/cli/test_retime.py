@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from anim.gltf.authoring import build_document
 from tests.cli.conftest import Call, Fixture
-from tests.cli.running import refusal
-from tests.files import clips_of
+from tests.cli.running import help_line, refusal
+from tests.clips import clip, skeleton, track
+from tests.files import clips_of, glb_of
 
 
 @pytest.mark.parametrize(
@@ -22,8 +26,8 @@ from tests.files import clips_of
     ],
 )
 def test_seconds(call: Call, fixture: Fixture, options: list[str], start: float, end: float) -> None:
-    clip = clips_of(call("retime", fixture("biped"), "--clip", "walk", "-q", *options).product())[0]
-    assert (clip.start, clip.end) == pytest.approx((start, end), abs=1e-6)
+    found = clips_of(call("retime", fixture("biped"), "--clip", "walk", "-q", *options).product())[0]
+    assert (found.start, found.end) == pytest.approx((start, end), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -38,3 +42,20 @@ def test_seconds(call: Call, fixture: Fixture, options: list[str], start: float,
 )
 def test_refusals(call: Call, fixture: Fixture, options: list[str], words: str) -> None:
     assert words in refusal(call("retime", fixture("biped"), *options), 2)
+
+
+@pytest.mark.parametrize(
+    ("start", "options", "advice"),
+    [
+        (0, ["--speed", "1e-9"], "choose a higher --speed, or a shorter --duration or --offset"),
+        (1e9, ["--speed", "0.5"], "gltf-anim trim shortens the clip, and moves a late start to 0 s"),
+    ],
+)
+def test_an_end_beyond_float32_has_advice(
+    start: float, options: list[str], advice: str, call: Call, tmp_path: Path
+) -> None:
+    moved = clip(track("translation", [start, start + 500], [[0, 0, 0], [1, 0, 0]]))
+    (tmp_path / "in.glb").write_bytes(glb_of(build_document(skeleton([-1]), [moved])))
+    run = call("retime", tmp_path / "in.glb", tmp_path / "out.glb", *options)
+    assert "(limit 16777216 s, for times in float32)" in refusal(run, 2)
+    assert help_line(run) == advice

@@ -15,6 +15,7 @@ from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.sampling.sample import sample
 from tests.cli.conftest import Call, Fixture
+from tests.cli.running import help_line, refusal
 from tests.khronos import errors, needs_validator, validate
 
 # Options with the same name and another meaning: VRM's, a ball's or a body's, of a fabric or of the air.
@@ -266,3 +267,10 @@ def test_cloth_without_sense_is_refused_in_one_line(
     assert (run.code, out.exists()) == (code, False), run.err
     assert words in run.err
     assert len(run.err.splitlines()) <= 2
+
+
+def test_the_advice_on_too_few_targets_names_an_option(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    line = ("--duration", "1", "--max-error", "1e-9", "--max-targets", "2")
+    run = call("simulate", "cloth", fixture("flag"), tmp_path / "out.glb", "--mesh", "flag", *line)
+    assert "2 morph targets can't keep every vertex within" in refusal(run, 2)
+    assert "more --max-targets" in help_line(run)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from anim.arrays import Floats, Ints
@@ -32,10 +34,22 @@ def frame_error(clip: Clip, times: Floats) -> tuple[float, float]:
         size = max(BLOCK_VALUES // (len(at) + len(times)), 1)
         for first in range(0, len(stack.tracks), size):
             batch = batches(stack.tracks[first : first + size])[0]
-            angles = (_step_angles if stepped else _slerp_angles)(batch, times, at)
-            worst = angles.argmax(axis=0)
-            most = max(most, *zip(angles.max(axis=0).tolist(), at[worst].tolist(), strict=True))
+            most = max(most, *_largest(_step_angles if stepped else _slerp_angles, batch, times, at))
     return most
+
+
+def _largest(
+    measure: Callable[[Batch, Floats, Floats], Floats], tracks: Batch, times: Floats, at: Floats
+) -> list[tuple[float, float]]:
+    """The largest angle of each track, and the first time of it; those of many times in blocks."""
+    angle, time = np.full(len(tracks.tracks), -1.0), np.zeros(len(tracks.tracks))
+    for first in range(0, len(at), BLOCK_VALUES):
+        some = at[first : first + BLOCK_VALUES]
+        low, high = _frames_before(times, some[[0, -1]])
+        angles = measure(tracks, times[low : high + 2], some)
+        worst, most = angles.argmax(axis=0), angles.max(axis=0)
+        time, angle = np.where(most > angle, some[worst], time), np.maximum(most, angle)
+    return list(zip(angle.tolist(), time.tolist(), strict=True))
 
 
 def _slerp_angles(tracks: Batch, times: Floats, at: Floats) -> Floats:

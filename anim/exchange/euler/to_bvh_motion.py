@@ -60,8 +60,9 @@ def to_bvh(
         raise UnsupportedError("there is no node to write")
     orders.check([names[node] for node in chosen])
     shown, times = _frames(clip, fps)
-    figure = _Skeleton(skeleton, clip, chosen, times)
-    nodes = _nodes(figure, [names[node] for node in chosen], orders, shown, meters_per_unit)
+    nodes = _nodes(
+        _Skeleton(skeleton, clip, chosen, times), [names[node] for node in chosen], orders, shown, meters_per_unit
+    )
     notes = (
         skipped_note(_unsupported_tracks(skeleton, clip, chosen))
         + _rename_nodes(skeleton, names, chosen)

@@ -45,10 +45,7 @@ class StageTimes:
 
 
 class StageBuilder:
-    """Writer of a document's meshes into an empty stage.
-
-    prims: the Mesh prim of every instance, by node.
-    """
+    """Writer of a document's meshes into an empty stage."""
 
     def __init__(self, stage: Any, document: Document, scene: Scene, clip: Clip, times: StageTimes) -> None:
         self._stage, self._document, self._scene, self._times = stage, document, scene, times
@@ -58,10 +55,13 @@ class StageBuilder:
         moving = [track for track in clip.tracks if track.path in NUM_COMPONENTS]
         self._animated = {track.node for track in moving if track.node is not None}
         self._num_scaled = 0  # morph targets with weights outside 0 … 1
-        self.prims: dict[int, Any] = {}
+        self._prims: dict[int, Any] = {}
 
-    def build(self, save_image: SaveImage, note: Callable[[str], None]) -> None:
-        """Write everything. save_image, note: as of UsdMaterials."""
+    def build(self, save_image: SaveImage, note: Callable[[str], None]) -> dict[int, Any]:
+        """Write everything, and return the Mesh prim of every instance, by node.
+
+        save_image, note: as of UsdMaterials.
+        """
         from pxr import UsdGeom, UsdSkel
 
         stage = self._stage
@@ -90,6 +90,7 @@ class StageBuilder:
             verb = "is" if self._num_scaled == 1 else "are"
             scaled = f"{plural(self._num_scaled, 'morph target')} {verb} scaled or split in two"
             note(f"{scaled}, for weights from 0 to 1, to which Blender clamps them")
+        return self._prims
 
     def _shown_materials(self, instances: Sequence[MeshInstance]) -> Iterator[int]:
         for each in instances:
@@ -129,7 +130,7 @@ class StageBuilder:
         primitives = self._primitives(instance)
         count = len(instance.mesh.positions)
         bind_primitives(self._document, prim, self._materials, count, instance.mesh.faces, primitives)
-        self.prims[instance.node] = prim
+        self._prims[instance.node] = prim
         return prim
 
     def _is_mirrored(self, node: int) -> bool:

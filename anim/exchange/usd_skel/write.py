@@ -64,11 +64,12 @@ def write(
     notes = dict.fromkeys(_left_out(document, scene, clip))
 
     def build(stage: Any, save_image: SaveImage) -> tuple[StageError, dict[int, str]]:
-        builder = StageBuilder(stage, document, scene, clip, times)
-        with hold_signals():
-            builder.build(save_image, lambda words: notes.update({words: None}))
-        error = stage_error(stage, builder.prims, scene, clip, times.seconds, times.codes)
-        return error, {node: str(prim.GetPath()) for node, prim in builder.prims.items()}
+        with hold_signals():  # the builder's poses of all frames are not kept while the error is measured
+            prims = StageBuilder(stage, document, scene, clip, times).build(
+                save_image, lambda words: notes.update({words: None})
+            )
+        error = stage_error(stage, prims, scene, clip, times.seconds, times.codes)
+        return error, {node: str(prim.GetPath()) for node, prim in prims.items()}
 
     error, paths = write_stage(outputs, ending, "scene.usdc", build)
     return UsdSkelResult(rate, len(times.seconds), error, tuple(notes), paths)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable
+from itertools import accumulate
 from typing import TypeAlias
 
 Range: TypeAlias = tuple[int, int]  # first byte, end
@@ -41,6 +42,20 @@ def difference(ranges: Iterable[Range], without: Iterable[Range]) -> list[Range]
                 start = cut_end
         left.append((start, end))
     return [(start, end) for start, end in left if start < end]
+
+
+def all_dropped(first: list[Range], then: Iterable[Range]) -> list[Range]:
+    """Return the dropped bytes of a buffer without `first`, and after that without `then`, offsets in what is left.
+
+    all_dropped([(0, 4)], [(2, 6)]) → [(0, 4), (6, 10)]
+    """
+    ends = list(accumulate((end - start for start, end in first), initial=0))  # dropped bytes before each range
+    left = [start - before for start, before in zip((start for start, _ in first), ends, strict=False)]
+
+    def old(at: int) -> int:
+        return at + ends[bisect_right(left, at)]
+
+    return union([*first, *((old(start), old(end - 1) + 1) for start, end in then if start < end)])
 
 
 def aligned(ranges: Iterable[Range]) -> list[Range]:

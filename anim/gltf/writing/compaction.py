@@ -78,7 +78,8 @@ def relocate_accessor(accessor: Json, views: list[Json], shift: list[OffsetMap])
 def rebuild_buffer(buffer: Buffer, shift: OffsetMap, appended: list[Bytes], where: str) -> Buffer:
     """Return the buffer without dropped bytes and with `appended` ones, aligned to four.
 
-    A buffer without data only gets shorter.
+    A buffer without data only gets shorter. What one before had dropped is dropped with it, from the bytes that both
+    come from: buffers in between are not loaded.
     """
     if not shift.dropped and not appended:
         return buffer
@@ -86,13 +87,16 @@ def rebuild_buffer(buffer: Buffer, shift: OffsetMap, appended: list[Bytes], wher
     if not buffer.has_data:
         return Buffer(length, buffer.uri, None, where=where)
     padding = np.zeros(-length % 4 if appended else 0, np.uint8)
+    origin, before = buffer.shortened or (buffer, [])
+    dropped = byte_ranges.all_dropped(before, shift.dropped)
 
     def load() -> Bytes:
-        kept = byte_ranges.difference([(0, buffer.byte_length)], shift.dropped)
-        return np.concatenate([*(buffer.data[start:end] for start, end in kept), padding, *appended])
+        kept = byte_ranges.difference([(0, origin.byte_length)], dropped)
+        return np.concatenate([*(origin.data[start:end] for start, end in kept), padding, *appended])
 
     total = length + len(padding) + sum(len(piece) for piece in appended)
-    return Buffer(total, buffer.uri, load, where=where, replaced=True)
+    shortened = None if appended else (origin, dropped)
+    return Buffer(total, buffer.uri, load, where=where, replaced=True, shortened=shortened)
 
 
 def referenced_ranges(view: Json) -> Iterator[tuple[int, Range]]:

@@ -111,6 +111,7 @@ def command(
     format: caches.FormatOption = None,
     up: caches.UpOption = None,
     max_error: caches.MaxError = None,
+    max_targets: caches.MaxTargets = None,
     quantize: caches.Quantize = False,
     layout: caches.LayoutOption = None,
     dry_run: common.DryRun = False,
@@ -130,7 +131,7 @@ def command(
     simulation.check_fps(fps)
     kind = check_report(report)
     ending = cache_files.check(output, None if format is None else f".{format}")
-    given: dict[str, Any] = {"quantize": quantize, "layout": layout}
+    given: dict[str, Any] = {"quantize": quantize, "layout": layout, "max_targets": max_targets}
     writing = caches.write_options(ending, given | {"max_error": max_error})
     substeps = max(1, math.ceil(1 / (fps * parse_seconds(step, "--step")) - 1e-9))
     limit = None if max_stretch is None else units.parse_fraction(max_stretch, "--max-stretch")

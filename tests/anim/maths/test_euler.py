@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,15 @@ def test_fewer_axes_are_fewer_turns() -> None:
 def test_an_unknown_order_is_refused() -> None:
     with pytest.raises(RangeError, match="`order` is 'XXY'"):
         euler.from_quaternion(np.array((0.0, 0, 0, 1)), order="XXY")
+
+
+@pytest.mark.parametrize("order", ["XYZ", "ZXZ"])
+def test_the_memory_of_many_keys_is_few_times_theirs(order: str) -> None:
+    """Of numpy's arrays: a clip of ten hours has a million keys."""
+    q = euler.to_quaternion(np.linspace((0, 0.1, 0), (300, 0.9, 20), 100_000), order=order)
+    tracemalloc.start()
+    try:
+        euler.unwrap(q, order=order)
+        assert tracemalloc.get_traced_memory()[1] < 7 * q.nbytes
+    finally:
+        tracemalloc.stop()

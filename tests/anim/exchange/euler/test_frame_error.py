@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.exchange.euler.frame_error import frame_error
+from anim.exchange.euler import frame_error
 from anim.exchange.euler.to_bvh_motion import to_bvh
-from tests.clips import STEP, about, clip, skeleton, track
+from anim.model import Interpolation
+from tests.clips import LINEAR, STEP, about, clip, skeleton, track
 
 
 def test_a_key_between_two_frames_is_lost() -> None:
     hit = clip(track("rotation", [0, 0.45, 0.5, 0.55, 1], about("z", [0, 0, 60, 0, 0])))
     frames = np.array([0, 0.4, 0.6, 1.0])
-    angle, time = frame_error(hit, frames)
+    angle, time = frame_error.frame_error(hit, frames)
     assert np.degrees(angle) == pytest.approx(60)
     assert time == 0.5
     (note,) = to_bvh(skeleton([-1]), hit, order="XYZ", fps=5).notes
@@ -22,21 +23,32 @@ def test_a_key_between_two_frames_is_lost() -> None:
 
 def test_frames_at_the_keys_lose_nothing() -> None:
     even = clip(track("rotation", [0, 0.5, 1], about("z", [0, 60, 10])))
-    assert frame_error(even, np.array([0, 0.5, 1]))[0] == pytest.approx(0, abs=1e-7)
+    assert frame_error.frame_error(even, np.array([0, 0.5, 1]))[0] == pytest.approx(0, abs=1e-7)
     assert to_bvh(skeleton([-1]), even, order="XYZ").notes == ()
 
 
 def test_a_step_between_two_frames_is_late_but_not_lost() -> None:
     stepped = clip(track("rotation", [0, 0.3, 1], about("z", [0, 60, 10]), STEP))
-    assert frame_error(stepped, np.array([0, 0.5, 1]))[0] == pytest.approx(0, abs=1e-7)
-    assert frame_error(stepped, np.array([0.0])) == (0.0, 0.0)
-    assert frame_error(stepped, np.array([0, 0.2])) == (0.0, 0.0)
+    assert frame_error.frame_error(stepped, np.array([0, 0.5, 1]))[0] == pytest.approx(0, abs=1e-7)
+    assert frame_error.frame_error(stepped, np.array([0.0])) == (0.0, 0.0)
+    assert frame_error.frame_error(stepped, np.array([0, 0.2])) == (0.0, 0.0)
 
 
 def test_a_step_that_ends_before_the_next_frame_is_lost() -> None:
     stepped = clip(track("rotation", [0, 0.512, 0.52, 1], about("z", [0, 90, 10, 0]), STEP))
-    angle, time = frame_error(stepped, np.arange(31) / 30)
+    angle, time = frame_error.frame_error(stepped, np.arange(31) / 30)
     assert np.degrees(angle) == pytest.approx(80)
     assert time == 0.512
     (note,) = to_bvh(skeleton([-1]), stepped, order="XYZ", fps=30).notes
     assert "up to 80° from the clip, at 0.512 s" in note
+
+
+@pytest.mark.parametrize("mode", [LINEAR, STEP])
+def test_blocks_of_times_are_as_all_at_once(mode: Interpolation, monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(3)
+    keys = np.unique(random.uniform(0, 9, 60).round(2))
+    turned = clip(track("rotation", keys, about("z", random.uniform(-170, 170, len(keys))), mode))
+    times = np.linspace(keys[0], keys[-1], 23)
+    whole = frame_error.frame_error(turned, times)
+    monkeypatch.setattr(frame_error, "BLOCK_VALUES", 7)
+    assert frame_error.frame_error(turned, times) == whole

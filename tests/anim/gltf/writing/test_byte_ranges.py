@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anim.gltf.writing.byte_ranges import OffsetMap, Range, aligned, difference, union
+from anim.gltf.writing.byte_ranges import OffsetMap, Range, aligned, all_dropped, difference, union
 
 LENGTH = 60
 RANGES = st.lists(st.tuples(st.integers(0, LENGTH), st.integers(0, LENGTH)), max_size=8)
@@ -57,3 +57,12 @@ def test_shift_says_where_every_byte_goes(dropped: list[Range]) -> None:
     assert shift.dropped_bytes == len(gone)
     for at in range(LENGTH + 1):
         assert shift(at) == len([i for i in range(at) if i not in gone])
+
+
+@given(RANGES, RANGES)
+def test_ranges_dropped_one_after_another(first: list[Range], then: list[Range]) -> None:
+    """The second ones are of what is left."""
+    left = sorted(set(range(2 * LENGTH)) - _bytes(first))
+    found = all_dropped(union(first), then)
+    _check_tidy(found)
+    assert set(range(2 * LENGTH)) - _bytes(found) == {each for i, each in enumerate(left) if i not in _bytes(then)}
