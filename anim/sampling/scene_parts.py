@@ -61,7 +61,7 @@ class SceneDivider:
         self._smallest = sizes[min(sizes)] if sizes else -1
 
     def part(self, clips: Sequence[Clip]) -> ScenePart | None:
-        """Return the part that clips move; None if it isn't small, or if the clips have pointers to morph weights.
+        """Return the part that clips move; None if that is none or too large, or if they have pointers to weights.
 
         A scene with vertices has some in each part, moved or not: what is measured depends on whether it has any.
         """
@@ -73,7 +73,7 @@ class SceneDivider:
         return ScenePart(Scene(select_nodes(self.scene.skeleton, nodes), _carry(instances, nodes)), nodes)
 
     def part_nodes(self, clips: Sequence[Clip]) -> frozenset[int] | None:
-        """Return the nodes of the part that clips move; None without one."""
+        """Return the nodes of that part; None without one."""
         found = self._find(clips)
         return None if found is None else frozenset(found[0])
 
@@ -108,7 +108,7 @@ class SceneDivider:
             chosen.add(self._smallest)
         instances = [self.scene.instances[i] for i in sorted(chosen)]
         kept = self._with_ancestors(moved.union(*({each.node, *_joints(each)} for each in instances)))
-        return (kept, instances) if len(kept) <= self.max_nodes else None
+        return (kept, instances) if moved and len(kept) <= self.max_nodes else None
 
     def _moved_nodes(self, clips: Iterable[Clip]) -> set[int] | None:
         """The nodes that clips move, by a track of their own or of an ancestor, and those with animated weights.
@@ -139,8 +139,8 @@ class SceneDivider:
 def select_nodes(skeleton: Skeleton, nodes: Ints) -> Skeleton:
     """Return the skeleton of some nodes (K,), increasing, with all of their ancestors among them."""
     parents = skeleton.parents[nodes]
-    sheared = np.flatnonzero(np.isin(skeleton.sheared, nodes))
-    index = {node: i for i, node in enumerate(nodes.tolist())} if skeleton.morphed else {}
+    index = {node: i for i, node in enumerate(nodes.tolist())}
+    sheared = [i for i, node in enumerate(skeleton.sheared.tolist()) if node in index]
     return Skeleton(
         tuple(map(skeleton.display_name, nodes.tolist())),
         np.where(parents < 0, -1, np.searchsorted(nodes, parents)),

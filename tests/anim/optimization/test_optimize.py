@@ -9,7 +9,7 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
-from anim.optimization import optimize as optimize_
+from anim.optimization import clip_batches
 from anim.optimization.options import PLAYERS as VERIFIED
 from anim.optimization.options import Drop, Objective, Packing, Policy
 from tests.anim.optimization.optimizing import error, optimized, request_for, waving
@@ -144,7 +144,7 @@ def test_where_nothing_has_a_vertex_nodes_are_not_invisible() -> None:
 
 
 def test_progress_goes_up_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(optimize_, "BATCH_KEYS", 0)  # one batch for each clip
+    monkeypatch.setattr(clip_batches, "BATCH_KEYS", 0)  # one batch for each clip
     document = opened_fixture("noop")
     said: list[float] = []
     optimized(document, request_for(document, 1e-2), progress=said.append)

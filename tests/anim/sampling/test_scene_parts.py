@@ -95,6 +95,8 @@ def test_no_part_of_most_nodes_or_of_small_scenes_or_with_pointers_to_weights() 
     small = Scene(skeleton([-1] * 10), ())
     assert SceneDivider(small).part([clip(track("scale", [0], [[1, 1, 1]], node=3))]) is None
     assert SceneDivider(small).part_nodes([]) is None
+    assert SceneDivider(scene).part([clip()]) is None
+    assert [(numbers, part) for numbers, part in SceneDivider(scene).batches([clip()] * 3, 60)] == [([0, 1, 2], None)]
 
 
 def test_sheared_nodes_keep_their_matrices() -> None:
