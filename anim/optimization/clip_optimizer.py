@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import ErrorMetric, MotionError, WholeScene
+from anim.measure.error.metric import ErrorMetric, MotionError
 from anim.measure.error.surface import diagonal
+from anim.measure.error.whole_scene import WholeScene
 from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
 from anim.optimization.options import EFFORTS, Effort, Request
@@ -60,7 +61,7 @@ class ClipOptimizer:
 
     before, after: the scene in its original and in its new rest pose. clips: all of the file. detailed: whether
     verifications include statistics. verified: whether errors are measured; else every result passes, for its size.
-    whole: the optimizer of the whole file, if `before` and `after` are parts of its scenes.
+    whole: the optimizer of the whole file, if `before` and `after` are parts of its scenes; sizes are those of its own.
     """
 
     def __init__(
@@ -103,24 +104,15 @@ class ClipOptimizer:
         )
 
     def on_part(self, clips: Sequence[Clip]) -> tuple[ScenePart, ClipOptimizer] | None:
-        """Return the part of the scene that clips move, with an optimizer of these clips on it; None if it isn't small.
-
-        All that is measured in metres or points of the whole scene stays so.
-        """
+        """Return the part of the scene that clips move, if it is small, with an optimizer of these clips on it."""
         before, after = (each.part(clips) for each in self.dividers)
         if before is None or after is None:
             return None
-        index = {node: i for i, node in enumerate(before.nodes.tolist())}
         policy = self.request.policy
-        keep = frozenset(index[node] for node in policy.keep if node in index)
+        keep = frozenset(i for i, node in enumerate(before.nodes.tolist()) if node in policy.keep)
+        request, own = replace(self.request, policy=replace(policy, keep=keep)), tuple(map(before.into, clips))
         return before, ClipOptimizer(
-            replace(self.request, policy=replace(policy, keep=keep)),
-            before.scene,
-            after.scene,
-            tuple(map(before.into, clips)),
-            detailed=self.detailed,
-            verified=self.verified,
-            whole=self,
+            request, before.scene, after.scene, own, detailed=self.detailed, verified=self.verified, whole=self
         )
 
     def worst_vertex(self, found: Verification) -> frozenset[tuple[int, int]]:
@@ -164,7 +156,7 @@ class ClipOptimizer:
         fraction = self.request.bounds.shell / (self._diagonal or 1.0)
         shell = None if self.request.policy.drop_invisible else fraction
         scene = (self if self._whole is None else self._whole).before
-        whole = WholeScene(self._diagonal, len(scene.skeleton), scene.vertex_count)
+        whole = WholeScene.of(scene, self._diagonal)
         return ErrorMetric(self.before, self.after, shell=shell, clips=self.clips, whole=whole)
 
     @cached_property

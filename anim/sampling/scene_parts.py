@@ -13,7 +13,7 @@ from anim.maths import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin, Track, parse_weight_pointer
 
 MIN_NODES = 64  # of a scene that is divided: with fewer a part saves nothing
-MAX_FRACTION = 0.25  # of the nodes, in a part
+MAX_NODE_FRACTION = 0.25  # of the nodes, in a part
 
 
 class ScenePart(NamedTuple):
@@ -45,7 +45,7 @@ class SceneDivider:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         skeleton = scene.skeleton
-        self.max_nodes = int(MAX_FRACTION * len(skeleton)) if len(skeleton) >= MIN_NODES else 0
+        self.max_nodes = int(MAX_NODE_FRACTION * len(skeleton)) if len(skeleton) >= MIN_NODES else 0
         if not self.max_nodes:
             return
         self._parents = skeleton.parents.tolist()

@@ -166,7 +166,8 @@ def _compare_pairs(
 ) -> list[ClipDiff]:
     """The differences of clips by index. Pairs with equal tracks are measured once."""
     first = first_equal([(old[i], new[j]) for i, j in pairs])
-    alike = len(set(parse_pair(player))) == 1 and are_equal(prover.ruler.scene, prover.ruler.other, prover.ruler.pairs)
+    same_scenes = are_equal(prover.ruler.scene, prover.ruler.other, prover.ruler.pairs)
+    alike = len(set(parse_pair(player))) == 1 and same_scenes
     found: list[ClipDiff] = []
     for n, (i, j) in enumerate(pairs):
         if first[n] < n:
@@ -180,7 +181,9 @@ def _compare_pairs(
         if alike and before.tracks == after.tracks:
             measured = _Measured(no_error(times), 0.0, STILL)
         else:
-            measured = _measure(prover, before, after, times, player=player, fps=fps)
+            part = prover.ruler.part(before, after) if same_scenes else None
+            placed = (prover, before, after) if part is None else (Prover(part[0]), *part[1:])
+            measured = _measure(*placed, times, player=player, fps=fps)
         ends = before.end, after.end
         found.append(ClipDiff(i, j, before.name, after.name, *measured, *ends, *_lost(prover.ruler, before, after)))
     return found
@@ -199,9 +202,6 @@ STILL = Statistics(0.0, 0.0, Peak(), Peak(), Peak())  # of equal clips
 
 def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player: str, fps: float) -> _Measured:
     ruler = prover.ruler
-    if (part := ruler.part(before, after)) is not None:
-        ruler, before, after = part
-        prover = Prover(ruler)
     look = ruler.sample_errors(before, after, times, players=(player,))
     error, bound = look.error, None
     if len(set(parse_pair(player))) == 1:
@@ -213,8 +213,8 @@ def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player
 
 def _lost(ruler: ErrorMetric, before: Clip, after: Clip) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Targets of tracks of only the old clip, and of only the new one."""
-    nodes = ruler.pairs.nodes.tolist()
-    one = {_target(track, nodes[track.node] if track.node is not None else -1): track for track in before.tracks}
+    nodes = ruler.pairs.nodes
+    one = {_target(track, int(nodes[track.node]) if track.node is not None else -1): track for track in before.tracks}
     other = {_target(track, track.node if track.node is not None else -1): track for track in after.tracks}
     missing = tuple(_label(ruler.scene, track) for key, track in one.items() if key not in other)
     return missing, tuple(_label(ruler.other, track) for key, track in other.items() if key not in one)

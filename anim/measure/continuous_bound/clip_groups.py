@@ -10,7 +10,8 @@ import numpy as np
 
 from anim.measure.continuous_bound.largest_error import largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
-from anim.measure.error.metric import ErrorMetric, WholeScene
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.whole_scene import WholeScene
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Track
 from anim.model.track import share_time_axes
 from anim.sampling.scene_parts import SceneDivider
@@ -99,7 +100,7 @@ def _side_by_side(prover: Prover, group: Sequence[ScenePair]) -> tuple[Prover, C
     offsets = np.cumsum([0, *(len(each.skeleton) for each in scenes[:-1])]).tolist()
     before, after = (_as_one(clips, offsets) for clips in zip(*((e.before, e.after) for e in group), strict=True))
     scene = _join(scenes, offsets)
-    whole = WholeScene(ruler.diagonal, len(scene.skeleton), scene.vertex_count)
+    whole = WholeScene.of(scene, ruler.diagonal)
     return Prover(ErrorMetric(scene, clips=(before, after), whole=whole)), before, after
 
 
@@ -109,8 +110,7 @@ def _as_one(clips: Sequence[Clip], offsets: Sequence[int]) -> Clip:
 
 
 def _moved(track: Track, nodes: int) -> Track:
-    assert track.node is not None
-    return replace(track, node=track.node + nodes)
+    return track if track.node is None else replace(track, node=track.node + nodes)
 
 
 def _join(scenes: Sequence[Scene], offsets: Sequence[int]) -> Scene:

@@ -19,14 +19,14 @@ from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.displacement import max_displacement
 from anim.measure.error.merged_groups import merge_points, merge_surfaces
-from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.posed_clips import AskedTimes, RecentSamplers, Samplers, pose_clips
 from anim.measure.error.reduced_skeleton import ReducedSkeleton, reduce_skeletons
 from anim.measure.error.sample_times import dense_times
-from anim.measure.error.shell_points import ShellPoints, nodes_without_vertices
-from anim.measure.error.surface import NUM_CORNERS, Surface, diagonal, has_vertices, node_cubes, surfaces
+from anim.measure.error.shell_points import ShellPoints, points_around_nodes
+from anim.measure.error.surface import Surface, diagonal, has_vertices, surfaces
+from anim.measure.error.whole_scene import WholeScene
 from anim.model import Clip, Scene
 from anim.sampling.players import parse_pair, sampler, sampler_for
 from anim.sampling.pose import PosedSkeleton, PoseSampler
@@ -80,14 +80,6 @@ class ErrorSamples(NamedTuple):
     block: Block | None = None
 
 
-class WholeScene(NamedTuple):
-    """Diagonal in m, and numbers of nodes and vertices of a scene."""
-
-    diagonal: float
-    num_nodes: int
-    num_vertices: int
-
-
 class ErrorMetric:
     """Error metric for clips on one scene, or on two corresponding ones: prepares what all clips share.
 
@@ -99,7 +91,7 @@ class ErrorMetric:
     clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
     whole: what `scene` is a part of; its other nodes don't move.
     num_static_points: number of vertices of rigid meshes, or of points of shells if there are none, on nodes that no
-    clip moves: in no group.
+    clip moves, and outside of a part: in no group.
     has_shell: whether there are such nodes, measured on a shell.
     """
 
@@ -121,7 +113,7 @@ class ErrorMetric:
             self.pairs = match_scenes(scene, self.other, found)
         self._reduced = None if clips is None else self._reduce(clips, found)
         self.skeletons = (scene.skeleton, self.other.skeleton) if self._reduced is None else self._reduced.versions
-        nodes, points = self._around_nodes(found, shell)
+        nodes, points = points_around_nodes(scene, self.pairs.nodes, found, shell, self.diagonal)
         self.has_shell = shell is not None and len(nodes) > 0
         has_cubes = shell is None and not found
         self.parts: list[PointGroups] = []
@@ -137,46 +129,26 @@ class ErrorMetric:
                 self.num_static_points = points[..., 0].size - sum(len(g) for each in around for g in each.groups)
             self.parts += [*groups, *around]
         if whole is not None:
-            nodes_beside, vertices_beside = (
-                whole.num_nodes - len(scene.skeleton),
-                whole.num_vertices - scene.vertex_count,
-            )
-            self.num_static_points += vertices_beside if self.pairs.surfaces else nodes_beside * points.shape[1]
+            self.num_static_points += whole.count_other_points(scene, points.shape[1])
         self.combined = combine_groups(self.parts)
         self._recent = RecentSamplers()
-        self._shell, self._whole = shell, whole or WholeScene(self.diagonal, len(scene.skeleton), scene.vertex_count)
+        self._shell, self._whole = shell, whole or WholeScene.of(scene, self.diagonal)
 
     def part(self, before: Clip, after: Clip) -> tuple[ErrorMetric, Clip, Clip] | None:
         """Return the metric of the part of the scenes that two clips move, with the clips for it.
 
-        None if the part is not small, or if not all nodes of the scenes have the same indices.
+        None if the part is not small. The scenes must be equal: what differs outside of the part would be ignored.
         """
-        if not np.array_equal(self.pairs.nodes, np.arange(len(self.other.skeleton))):
-            return None
         one, other = (each.part((before, after)) for each in self._dividers)
         if one is None or other is None or not np.array_equal(one.nodes, other.nodes):
             return None
         clips = one.into(before), one.into(after)
-        metric = ErrorMetric(one.scene, other.scene, shell=self._shell, clips=clips, whole=self._whole)
-        return (metric, *clips) if np.array_equal(metric.pairs.nodes, np.arange(len(one.nodes))) else None
+        return ErrorMetric(one.scene, other.scene, shell=self._shell, clips=clips, whole=self._whole), *clips
 
     @cached_property
     def _dividers(self) -> tuple[SceneDivider, SceneDivider]:
         found = SceneDivider(self.scene)
         return found, found if self.other is self.scene else SceneDivider(self.other)
-
-    def _around_nodes(self, surfaces: Sequence[Surface], shell: float | None) -> tuple[Ints, Floats]:
-        """The nodes (S,) that are measured at points (S, P, 3) around them, in their spaces.
-
-        On shells those without vertices; on cubes all of a scene without any surface.
-        """
-        if shell is not None:
-            bare = nodes_without_vertices(self.scene.skeleton, surfaces)
-            nodes = np.flatnonzero(bare & (self.pairs.nodes >= 0))
-            return nodes, shell_points(self.scene.skeleton, nodes, shell * self.diagonal)
-        if surfaces:
-            return np.empty(0, np.int64), np.empty((0, NUM_CORNERS, 3))
-        return np.arange(len(self.scene.skeleton)), node_cubes(self.scene, self.diagonal)
 
     def _reduce(self, clips: Iterable[Clip], surfaces: Sequence[Surface]) -> ReducedSkeleton | None:
         """The skeletons without static nodes, None where that is not possible or not worth it."""

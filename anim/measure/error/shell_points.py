@@ -9,8 +9,9 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hierarchy
 from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
-from anim.measure.error.surface import Surface
-from anim.model import Skeleton
+from anim.measure.error.orientation_probes import shell_points
+from anim.measure.error.surface import NUM_CORNERS, Surface, node_cubes
+from anim.model import Scene, Skeleton
 from anim.sampling.pose import PosedSkeleton
 
 
@@ -74,3 +75,19 @@ def nodes_without_vertices(skeleton: Skeleton, surfaces: Sequence[Surface]) -> B
     shown = hierarchy.with_ancestors(skeleton.parents, shown)
     shown[[surface.owner for surface in surfaces]] = True
     return ~shown
+
+
+def points_around_nodes(
+    scene: Scene, partners: Ints, surfaces: Sequence[Surface], shell: float | None, diagonal: float
+) -> tuple[Ints, Floats]:
+    """Return the nodes (S,) that are measured at points (S, P, 3) around them, in their spaces.
+
+    On shells those without vertices; on cubes all of a scene without any surface. partners: (N,) of nodes in the other
+    scene, −1 without one. shell: as a fraction of the diagonal in m, None for no shells.
+    """
+    if shell is not None:
+        nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, surfaces) & (partners >= 0))
+        return nodes, shell_points(scene.skeleton, nodes, shell * diagonal)
+    if surfaces:
+        return np.empty(0, np.int64), np.empty((0, NUM_CORNERS, 3))
+    return np.arange(len(scene.skeleton)), node_cubes(scene, diagonal)

@@ -12,7 +12,7 @@ from anim.measure.loops.skin_motion import SkinMotion
 from anim.sampling.scene_parts import ScenePart
 
 MIN_VALUES = 2000  # clips × nodes: fewer are measured as soon as parts are found
-MAX_VALUES = 2000  # clips × nodes of a part
+MAX_VALUES = 2000  # clips × nodes of a part: more take longer than the calls of numpy for another part
 
 Result = TypeVar("Result")
 Measure = Callable[[SkinMotion, Sequence[LoopRange]], list[Result]]

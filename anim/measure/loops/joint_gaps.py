@@ -63,7 +63,7 @@ def _by_clip(
 
 
 def moving_nodes(skin: SkinMotion, parts: Sequence[LoopRange]) -> list[set[int]]:
-    """Return for each range the nodes with points that move in its first or in its last frame."""
+    """Return for each range the nodes, of the whole scene, with points that move in its first or in its last frame."""
     carrying = _carrying(skin)
     found: list[set[int]] = []
     for some in _blocks(skin, parts, 4):

@@ -22,9 +22,11 @@ from anim.measure.loops.end_frames import find_end_frames
 from anim.measure.loops.joint_gaps import joint_gaps
 from anim.measure.loops.loop_analysis import analyze_loops
 from anim.measure.loops.skin_motion import SkinMotion
+from anim.model import Scene
 from anim.operations.resample import resample
 from anim.sampling import scene_parts
 from tests import many
+from tests.clips import clip, track
 from tests.files import opened
 
 ARMS = opened(many.clips_of_arms(40))
@@ -103,11 +105,57 @@ def test_differences(monkeypatch: pytest.MonkeyPatch) -> None:
         assert one.statistics.angle == other.statistics.angle
 
 
-def test_scenes_of_other_nodes_have_no_common_part() -> None:
-    nodes = [*ARMS.json["nodes"], {"name": "more"}]
-    other = reader.scene(replace(ARMS, json={**ARMS.json, "nodes": nodes}))
-    assert ErrorMetric(SCENE).part(CLIPS[0], NEW[0]) is not None
-    assert ErrorMetric(SCENE, other).part(CLIPS[0], NEW[0]) is None
+def _with(**changed: Any) -> Scene:
+    return reader.scene(replace(ARMS, json={**ARMS.json, **changed}))
+
+
+def _node(number: int, **changed: Any) -> list[Any]:
+    nodes = list(ARMS.json["nodes"])
+    nodes[number] = {key: value for key, value in {**nodes[number], **changed}.items() if value is not None}
+    return nodes
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        _node(36, translation=[5, 5, 5]),
+        _node(37, mesh=None),
+        _node(4 * 40, skin=None),
+        [*ARMS.json["nodes"], {"name": "more"}],
+    ],
+    ids=["rest pose", "lost mesh", "lost skin", "another node"],
+)
+def test_differences_of_what_no_clip_moves(nodes: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    other = _with(nodes=nodes)
+
+    def measure() -> list[str]:
+        return [repr(each) for each in diff(ErrorMetric(SCENE, other, shell=0.01), CLIPS[:4], CLIPS[:4]).clips]
+
+    on_parts, on_whole = _both(measure, monkeypatch)
+    assert on_parts == on_whole
+
+
+def test_vertices_of_repeated_primitives_are_not_counted_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, skinned = ARMS.json["meshes"]
+    thrice = replace(ARMS, json={**ARMS.json, "meshes": [{"primitives": 3 * mesh["primitives"]}, skinned]})
+    scene = reader.scene(thrice, repeats=False)
+
+    def measure() -> list[float]:
+        found = diff(ErrorMetric(scene, shell=0.01), CLIPS[:4], NEW[:4]).clips
+        return [value for each in found for value in (each.statistics.mean, each.statistics.p99)]
+
+    on_parts, on_whole = _both(measure, monkeypatch)
+    assert on_parts == pytest.approx(on_whole, rel=1e-9)
+    assert max(on_whole) > 1e-4
+
+
+def test_clips_with_a_pointer_to_a_material(monkeypatch: pytest.MonkeyPatch) -> None:
+    pointer = track("/materials/0/pbrMetallicRoughness/metallicFactor", [0, 1], [[0], [1]])
+    pairs = [(clip(*one.tracks, pointer), clip(*other.tracks, pointer)) for one, other in zip(CLIPS, NEW, strict=True)]
+    prover = Prover(ErrorMetric(SCENE))
+    on_parts, on_whole = _both(lambda: clip_groups.largest_error_of(prover, pairs), monkeypatch)
+    assert on_parts.error.max_error == pytest.approx(on_whole.error.max_error, rel=1e-6)
+    assert on_parts.error.joint == on_whole.error.joint
 
 
 def test_the_largest_error_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
