@@ -42,7 +42,7 @@ def skeleton(parents: Sequence[int], **rest: Any) -> Skeleton:
     n = len(parents)
     rotation = np.tile([0.0, 0, 0, 1], (n, 1))
     parts: dict[str, Any] = {"translation": np.zeros((n, 3)), "rotation": rotation, "scale": np.ones((n, 3))}
-    parts |= {key: np.asarray(value, float) for key, value in rest.items()}
+    parts |= {key: value if key == "morphed" else np.asarray(value, float) for key, value in rest.items()}
     return Skeleton(tuple(map(str, range(n))), np.array(parents, np.int64), **parts)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Ints
+from anim.arrays import Floats, Ints
 from anim.maths import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin, Track, parse_weight_pointer
 
@@ -137,10 +137,10 @@ class SceneDivider:
 
 
 def select_nodes(skeleton: Skeleton, nodes: Ints) -> Skeleton:
-    """Return the skeleton of some nodes (K,), increasing, with all of their ancestors among them."""
+    """Return the skeleton of some nodes (K,), at least one, increasing, with all of their ancestors among them."""
     parents = skeleton.parents[nodes]
-    index = {node: i for i, node in enumerate(nodes.tolist())}
-    sheared = [i for i, node in enumerate(skeleton.sheared.tolist()) if node in index]
+    sheared = _find(skeleton.sheared, nodes)
+    morphed = [skeleton.morphed[i] for i in _find(skeleton.derive(_morphed_nodes), nodes).tolist()]
     return Skeleton(
         tuple(map(skeleton.display_name, nodes.tolist())),
         np.where(parents < 0, -1, np.searchsorted(nodes, parents)),
@@ -149,8 +149,18 @@ def select_nodes(skeleton: Skeleton, nodes: Ints) -> Skeleton:
         skeleton.scale[nodes],
         np.searchsorted(nodes, skeleton.sheared[sheared]),
         skeleton.sheared_local[sheared],
-        tuple(each._replace(node=index[each.node]) for each in skeleton.morphed if each.node in index),
+        tuple(each._replace(node=int(np.searchsorted(nodes, each.node))) for each in morphed),
     )
+
+
+def _morphed_nodes(skeleton: Skeleton) -> Floats:
+    return np.array([each.node for each in skeleton.morphed], np.float64)
+
+
+def _find(values: Ints | Floats, nodes: Ints) -> Ints:
+    """The indices of those of values (X,) that are among nodes (K,), at least one, increasing."""
+    places = np.minimum(np.searchsorted(nodes, values), len(nodes) - 1)
+    return np.flatnonzero(nodes[places] == values)
 
 
 def select_tracks(clip: Clip, nodes: Ints) -> Clip:

@@ -7,9 +7,9 @@ import pytest
 
 from anim.gltf.reading import reader
 from anim.measure.error.surface import place_points, surfaces
-from anim.model import Clip, Scene
+from anim.model import Clip, MorphedNode, Scene
 from anim.sampling.clips import sample_world_matrices
-from anim.sampling.scene_parts import SceneDivider
+from anim.sampling.scene_parts import SceneDivider, select_nodes
 from tests import many
 from tests.clips import clip, skeleton, track
 from tests.files import opened
@@ -97,6 +97,12 @@ def test_no_part_of_most_nodes_or_of_small_scenes_or_with_pointers_to_weights() 
     assert SceneDivider(small).part_nodes([]) is None
     assert SceneDivider(scene).part([clip()]) is None
     assert [(numbers, part) for numbers, part in SceneDivider(scene).batches([clip()] * 3, 60)] == [([0, 1, 2], None)]
+
+
+def test_nodes_with_morph_targets_stay_with_their_weights() -> None:
+    morphed = tuple(MorphedNode(node, node // 2, (0.5, node / 100), has_own=True) for node in (3, 40, 41, 99))
+    found = select_nodes(skeleton([-1] * 100, morphed=morphed), np.array([3, 8, 41]))
+    assert found.morphed == (morphed[0]._replace(node=0), morphed[2]._replace(node=2))
 
 
 def test_sheared_nodes_keep_their_matrices() -> None:
