@@ -117,40 +117,6 @@ def clips_equal(count: int) -> bytes:
     return _file([{"name": "n", "mesh": 0}], animations=[_clip([0], f"c{i}") for i in range(count)], meshes=[MESH])
 
 
-def clips_of_arms(count: int) -> bytes:
-    """Arms beside each other, and a clip for each that moves it alone; every fourth arm has a skin, some a mesh.
-
-    Each has four nodes, the last two without a name. Every fifth clip closes as a loop.
-    """
-    nodes: list[Json] = []
-    for i in range(count):
-        first, carried = 4 * i, {"mesh": 0} if i % 4 in (0, 1) else {}
-        nodes += [
-            {"name": f"arm{i}", "translation": [0.3 * (i % 8), 0, 0.3 * (i // 8)], "children": [first + 1]},
-            {"name": f"hand{i}", "translation": [0, 0.1, 0], "children": [first + 2, first + 3], **carried},
-            {"translation": [0, 0.05, 0], "scale": [1, 1.5, 1]},
-            {"translation": [0.05, 0, 0], **carried},
-        ]
-    skinned = range(3, count, 4)
-    nodes += [{"name": f"skin{i}", "mesh": 1, "skin": k} for k, i in enumerate(skinned)]
-    skins = [{"joints": [4 * i, 4 * i + 1], "inverseBindMatrices": 3} for i in skinned]
-    random = np.random.default_rng(count)
-    times = np.arange(13) / 12
-    more: list[Any] = [("SCALAR", 5126, times)]
-    animations = []
-    for i in range(count):
-        angles = 0.3 * random.normal() * np.sin(2 * np.pi * times) + (0 if i % 5 == 0 else 0.2) * times**2
-        half = np.array([np.zeros(13), np.zeros(13), np.sin(angles / 2), np.cos(angles / 2)]).T
-        path = np.array([0.3 * (i % 8), 0, 0.3 * (i // 8)]) + np.outer(0.01 * (i % 3) * times, [1, 0, 0])
-        more += [("VEC4", 5126, half), ("VEC3", 5126, path)]
-        own = [{"input": 6, "output": 7 + 2 * i}, {"input": 6, "output": 8 + 2 * i}]
-        paths = [(4 * i + 1, "rotation"), (4 * i, "translation")]
-        channels = [{"sampler": k, "target": {"node": node, "path": path}} for k, (node, path) in enumerate(paths)]
-        animations.append({"name": f"c{i}", "samplers": own, "channels": channels})
-    parts: Json = {"skins": skins, "meshes": [MESH, {"primitives": [SKINNED]}], "animations": animations}
-    return _file(nodes, more=more, **parts)
-
-
 def clips_different(count: int) -> bytes:
     """Clips of other keys each."""
     angles = np.linspace(0.1, 3, 3 * count)

@@ -91,8 +91,7 @@ class ErrorMetric:
     clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
     whole: what `scene` is a part of; its other nodes don't move.
     num_static_points: number of vertices of rigid meshes, or of points of shells if there are none, on nodes that no
-    clip moves, and outside of a part: in no group.
-    has_shell: whether there are such nodes, measured on a shell.
+    clip moves, and outside of a part: in no group. has_shell: whether there are such nodes, measured on a shell.
     """
 
     def __init__(
@@ -105,7 +104,8 @@ class ErrorMetric:
         whole: WholeScene | None = None,
     ) -> None:
         self.scene, self.other = scene, other or scene
-        self.diagonal = diagonal(scene) if whole is None else whole.diagonal
+        self._shell, self._whole = shell, whole or WholeScene.of(scene, diagonal(scene))
+        self.diagonal = self._whole.diagonal
         found = surfaces(scene) if has_vertices(scene) else []
         self.pairs: Correspondence = match_scenes(scene, self.other, found)
         if shell is None and not found and (self.pairs.nodes < 0).any():
@@ -128,27 +128,23 @@ class ErrorMetric:
             if not self.pairs.surfaces:
                 self.num_static_points = points[..., 0].size - sum(len(g) for each in around for g in each.groups)
             self.parts += [*groups, *around]
-        if whole is not None:
-            self.num_static_points += whole.count_other_points(scene, points.shape[1])
+        self.num_static_points += self._whole.count_other_points(scene, points.shape[1])
         self.combined = combine_groups(self.parts)
         self._recent = RecentSamplers()
-        self._shell, self._whole = shell, whole or WholeScene.of(scene, self.diagonal)
 
     def part(self, before: Clip, after: Clip) -> tuple[ErrorMetric, Clip, Clip] | None:
-        """Return the metric of the part of the scenes that two clips move, with the clips for it.
+        """Return the metric of the part of the scene that two clips move, with the clips for it.
 
-        None if the part is not small. The scenes must be equal: what differs outside of the part would be ignored.
+        None if the part is not small. Both scenes must be equal: the first one's part stands for both.
         """
-        one, other = (each.part((before, after)) for each in self._dividers)
-        if one is None or other is None or not np.array_equal(one.nodes, other.nodes):
+        if (found := self._divider.part((before, after))) is None:
             return None
-        clips = one.into(before), one.into(after)
-        return ErrorMetric(one.scene, other.scene, shell=self._shell, clips=clips, whole=self._whole), *clips
+        clips = found.into(before), found.into(after)
+        return ErrorMetric(found.scene, shell=self._shell, clips=clips, whole=self._whole), *clips
 
     @cached_property
-    def _dividers(self) -> tuple[SceneDivider, SceneDivider]:
-        found = SceneDivider(self.scene)
-        return found, found if self.other is self.scene else SceneDivider(self.other)
+    def _divider(self) -> SceneDivider:
+        return SceneDivider(self.scene)
 
     def _reduce(self, clips: Iterable[Clip], surfaces: Sequence[Surface]) -> ReducedSkeleton | None:
         """The skeletons without static nodes, None where that is not possible or not worth it."""

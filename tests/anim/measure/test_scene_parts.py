@@ -25,11 +25,11 @@ from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Scene
 from anim.operations.resample import resample
 from anim.sampling import scene_parts
-from tests import many
+from tests.arms import arms
 from tests.clips import clip, track
 from tests.files import opened
 
-ARMS = opened(many.clips_of_arms(40))
+ARMS = opened(arms(40))
 SCENE, CLIPS = reader.scene(ARMS), reader.clips(ARMS)
 ROOTS = [root_motion.root_motion_node(SCENE.skeleton, each) for each in CLIPS]
 NEW = tuple(resample(each, fps=7) for each in CLIPS)
@@ -136,8 +136,8 @@ def test_differences_of_what_no_clip_moves(nodes: list[Any], monkeypatch: pytest
 
 
 def test_vertices_of_repeated_primitives_are_not_counted_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, skinned = ARMS.json["meshes"]
-    thrice = replace(ARMS, json={**ARMS.json, "meshes": [{"primitives": 3 * mesh["primitives"]}, skinned]})
+    mesh, *others = ARMS.json["meshes"]
+    thrice = replace(ARMS, json={**ARMS.json, "meshes": [{"primitives": 3 * mesh["primitives"]}, *others]})
     scene = reader.scene(thrice, repeats=False)
 
     def measure() -> list[float]:

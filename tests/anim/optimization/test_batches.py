@@ -14,9 +14,9 @@ from anim.optimization.clip_batches import BATCH_CLIPS, BATCH_KEYS, BATCH_MATRIC
 from anim.optimization.options import Bounds, Drop, Packing, Policy
 from anim.sampling import scene_parts
 from anim.sampling.scene_parts import SceneDivider
-from tests import many
 from tests.anim.optimization.making import task_of
 from tests.anim.optimization.optimizing import optimized, request_for
+from tests.arms import arms
 from tests.clips import clip, track
 from tests.clips import skeleton as skeleton_of
 from tests.files import glb_of, opened, opened_fixture
@@ -100,7 +100,7 @@ def test_the_same_bytes_for_any_batches(fixture: str, name: str, monkeypatch: py
 
 @pytest.mark.parametrize("effort", ["fast", "balanced"])
 def test_the_same_bytes_on_parts_of_the_scene(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    document = opened(many.clips_of_arms(24))
+    document = opened(arms(24))
     request = request_for(document, 1e-3, effort=effort, policy=Policy(Drop.REST, keep=frozenset({13, 20})))
     on_parts, _ = optimized(document, request, detailed=True)
     monkeypatch.setattr(scene_parts, "MIN_NODES", 10**9)

@@ -10,12 +10,12 @@ from anim.measure.error.surface import place_points, surfaces
 from anim.model import Clip, MorphedNode, Scene
 from anim.sampling.clips import sample_world_matrices
 from anim.sampling.scene_parts import SceneDivider, select_nodes
-from tests import many
+from tests.arms import arms
 from tests.clips import clip, skeleton, track
 from tests.files import opened
 
 TIMES = np.linspace(0, 1.1, 9)
-ARMS = opened(many.clips_of_arms(40))
+ARMS = opened(arms(40))
 SCENE, CLIPS = reader.scene(ARMS), reader.clips(ARMS)
 
 
