@@ -1,6 +1,6 @@
 """python -m tests.fuzz [FAMILY ...] [--count N] [--seed S] [--seconds T] [--keep FOLDER]: fuzz the commands.
 
-Families: gltf, euler, cache, springs, bodies, settings, and rigs, whose outputs are judged; all of them without any.
+Families: gltf, euler, cache, usd, springs, bodies, settings, and rigs, whose outputs are judged; all if none is given.
 Runs mutations of fixtures until N of each family are done, or T seconds have passed; prints each new kind of fault,
 and keeps its input in FOLDER, as one JSON file. Such a file in tests/fuzz/found is a test from then on.
 """

@@ -16,7 +16,8 @@ FOUND = Path(__file__).with_name("found")
 COUNTS = {  # mutations; 10 to 30 s each
     "gltf": 1200,
     "euler": 6000,
-    "cache": 1200,
+    "cache": 2000,
+    "usd": 60,
     "springs": 800,
     "bodies": 800,
     "settings": 1600,
