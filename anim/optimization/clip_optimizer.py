@@ -14,7 +14,7 @@ from anim.measure.error.surface import diagonal
 from anim.measure.error.whole_scene import WholeScene
 from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
-from anim.optimization.options import EFFORTS, Effort, Request
+from anim.optimization.options import Effort, Request, find_effort
 from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.lockstep import SearchRequest
 from anim.optimization.search.long_clips import search_all
@@ -132,7 +132,7 @@ class ClipOptimizer:
             bounds=request.bounds,
             policy=request.policy,
             coding=Encoding(request.packing, BYTE_COSTS[request.objective]),
-            effort=EFFORTS[request.effort],
+            effort=find_effort(request.effort, request.packing),
             extra=extra,
         )
         return found if self._whole is None else replace(found, size=self._whole.context().size)

@@ -23,7 +23,7 @@ from cli.text import format_length
 from cli.workflows.optimize_job import OptimizeJob, with_bound
 
 FAST = "fast"  # effort of sizes that are tried
-USUAL_RATIO = 0.985  # bytes of animation after a longer search, as a fraction of those after a fast one
+USUAL_RATIO = 0.96  # bytes of animation after a longer search, as a fraction of those after a fast one
 RATIO_CLIPS = 8  # one clip of so many measures that ratio
 SIZE_CLIPS = 3  # one clip of so many measures sizes at other bounds than the first
 MIN_SIZE_CLIPS = 12  # of a file; of fewer all are measured

@@ -65,9 +65,9 @@ def test_one_full_search_with_verification(
 
     monkeypatch.setattr(OptimizeJob, "run", counted)
     source, output = fixture("noop"), tmp_path / "out.glb"
-    assert call("optimize", source, output, "--max-bytes", "5600").code == 0
+    assert call("optimize", source, output, "--max-bytes", "5550").code == 0
     clips = len(container.read(source.read_bytes()).json["animations"])
-    assert output.stat().st_size <= 5600
+    assert output.stat().st_size <= 5550
     assert [each for each in runs if each[1]] == [("balanced", True, clips)]
     assert sum(each[0] == "balanced" for each in runs) <= 3
     assert all(count <= -(-clips // 4) for effort, verified, count in runs if effort == "balanced" and not verified)

@@ -116,7 +116,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
 def _opened(file: BinaryIO) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(file)
-    except (zipfile.BadZipFile, OSError, ValueError) as error:
+    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError) as error:  # the second for a later version
         raise FormatError(f"is no .npz ({str(error).lower()})") from None
 
 

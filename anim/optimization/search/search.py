@@ -198,7 +198,6 @@ class _Search:
         for factor in self._effort.finishing:
             yield from self._attempt(replace(plan, budgets=plan.budgets * factor))
         yield from self._store_coarser()
-        yield from self._regroup()
         yield from self._random_trials(self._effort.random_trials)
         yield from self._regroup()
 

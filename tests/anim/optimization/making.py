@@ -10,7 +10,7 @@ from anim.arrays import Floats
 from anim.measure.error.point_matrix import PointMatrix, sample_points
 from anim.model import Clip, Scene
 from anim.optimization.clip import Task, solve
-from anim.optimization.options import EFFORTS, Bounds, Objective, Packing, Policy, Reference
+from anim.optimization.options import Bounds, Objective, Packing, Policy, Reference, find_effort
 from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.long_clips import search_all
@@ -133,5 +133,5 @@ def setting_of(
         bounds=bounds or Bounds(max_error, 0.02),
         policy=policy or Policy(),
         coding=Encoding(packing, BYTE_COSTS[Objective.FILE]),
-        effort=EFFORTS[effort],
+        effort=find_effort(effort, packing),
     )

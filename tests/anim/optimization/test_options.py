@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from anim.gltf.validation.buffer_layout import MESHOPT
-from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference
+from anim.optimization.options import EFFORTS, Drop, Objective, Packing, Policy, Reference, find_effort
 
 
 def test_names_of_the_command_line() -> None:
@@ -24,8 +26,10 @@ def test_nothing_is_given_up_unless_asked_for() -> None:
     assert policy.reference is Reference.CURVE
 
 
-def test_each_effort_tries_what_a_smaller_one_does_and_more() -> None:
-    fast, balanced, most = EFFORTS.values()
+@pytest.mark.parametrize("packing", Packing)
+def test_each_effort_tries_what_a_smaller_one_does_and_more(packing: Packing) -> None:
+    fast, balanced, most = (find_effort(name, packing) for name in EFFORTS)
+    assert most.also_try == balanced
     for less, more in ((fast, balanced), (balanced, most)):
         assert less.rounds <= more.rounds
         assert set(less.axes) <= set(more.axes)

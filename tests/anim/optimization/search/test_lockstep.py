@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.model import Clip
-from anim.optimization.options import EFFORTS, Bounds, Packing
+from anim.optimization.options import EFFORTS, Bounds, Packing, find_effort
 from anim.optimization.search.context import Context
 from anim.optimization.search.lockstep import SearchRequest, SearchResult, search_clips
 from anim.optimization.search.plan import RotationTarget
@@ -71,9 +71,10 @@ CONTEXTS = _contexts()
 
 
 def _check_together(context: Context, requests: list[SearchRequest], effort: str) -> None:
-    together = search_clips(context, requests, EFFORTS[effort])
+    tried = find_effort(effort, context.coding.packing)
+    together = search_clips(context, requests, tried)
     for found, request in zip(together, requests, strict=True):
-        (alone,) = search_clips(context, [request], EFFORTS[effort])
+        (alone,) = search_clips(context, [request], tried)
         _same(found, alone)
     sizes = [found.result.size for found in together if found is not None]
     assert len(set(sizes)) == len(requests)
@@ -105,7 +106,7 @@ def test_the_order_of_clips_changes_nothing() -> None:
 @pytest.mark.slow
 def test_some_searches_aim_at_the_world() -> None:
     """Else the comparisons above say nothing of it."""
-    found = search_clips(CONTEXTS["ext"], _requests(), EFFORTS["balanced"])
+    found = search_clips(CONTEXTS["ext"], _requests(), find_effort("balanced", Packing.EXT))
     targets = {each.result.plan.rotation_target for each in found if each is not None}
     assert RotationTarget.WORLD in targets
 
