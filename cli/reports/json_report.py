@@ -9,20 +9,38 @@ from collections.abc import Iterator
 
 from anim.errors import FormatError
 
+MAX_INDENTED_VALUES = 200_000
+
 
 def dump(content: object, *, indent: int | None = 1) -> str:
-    """Return a report as a JSON document that ends with a line break. Raises FormatError for NaN and infinity."""
-    text = io.StringIO()
+    """Return a report as a JSON document that ends with a line break. Raises FormatError for NaN and infinity.
+
+    Without an indent, or of more than MAX_INDENTED_VALUES, it has a single line: the encoder that indents takes several
+    times as long, and what is that long is read by programs.
+    """
     try:
         if indent is None:
-            text.write(json.dumps(content, allow_nan=False))
-        else:  # piece by piece: a list of all pieces takes several times the memory of the text
-            json.dump(content, text, allow_nan=False, ensure_ascii=False, indent=indent)
+            return json.dumps(content, allow_nan=False) + "\n"
+        if _is_long(content):
+            return json.dumps(content, allow_nan=False, ensure_ascii=False) + "\n"
+        text = io.StringIO()  # piece by piece: a list of all pieces takes several times the memory of the text
+        json.dump(content, text, allow_nan=False, ensure_ascii=False, indent=indent)
     except ValueError:
         check_finite(content)
         raise
     text.write("\n")
     return text.getvalue()
+
+
+def _is_long(content: object) -> bool:
+    """Return whether a report has more than MAX_INDENTED_VALUES values, those of lists and objects."""
+    waiting, count = [content], 0
+    while waiting and count <= MAX_INDENTED_VALUES:
+        value = waiting.pop()
+        inside = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+        count += len(inside)
+        waiting += [each for each in inside if isinstance(each, dict | list | tuple)]
+    return count > MAX_INDENTED_VALUES
 
 
 def check_finite(content: object) -> None:
