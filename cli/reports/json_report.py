@@ -19,10 +19,8 @@ def dump(content: object, *, indent: int | None = 1) -> str:
     times as long, and what is that long is read by programs.
     """
     try:
-        if indent is None:
-            return json.dumps(content, allow_nan=False) + "\n"
-        if _is_long(content):
-            return json.dumps(content, allow_nan=False, ensure_ascii=False) + "\n"
+        if indent is None or _is_long(content):
+            return json.dumps(content, allow_nan=False, ensure_ascii=indent is None) + "\n"
         text = io.StringIO()  # piece by piece: a list of all pieces takes several times the memory of the text
         json.dump(content, text, allow_nan=False, ensure_ascii=False, indent=indent)
     except ValueError:

@@ -114,14 +114,11 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
 
 
 def _opened(file: BinaryIO) -> zipfile.ZipFile:
-    try:
-        return zipfile.ZipFile(file)
-    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError) as error:  # the second for a later version
-        raise FormatError(f"is no .npz ({str(error).lower()})") from None
+    return _reads(lambda: zipfile.ZipFile(file), "is no .npz")  # type: ignore[no-any-return]
 
 
-def _reads(job: Callable[[], Any]) -> Any:
-    """Result of a job on a zip; any exception of an invalid zip becomes a FormatError."""
+def _reads(job: Callable[[], Any], problem: str = "is damaged") -> Any:
+    """Result of a job on a zip; any exception of an invalid zip becomes a FormatError with this problem."""
     try:
         return job()
     except AnimError:
@@ -129,7 +126,7 @@ def _reads(job: Callable[[], Any]) -> Any:
     except MemoryError:
         raise
     except Exception as error:  # of zip, of its compressions, and of headers, which are Python literals
-        raise FormatError(f"is damaged ({' '.join(str(error).lower().split())[:80]})") from None
+        raise FormatError(f"{problem} ({' '.join(str(error).lower().split())[:80]})") from None
 
 
 def _header(member: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:

@@ -82,3 +82,12 @@ def test_what_is_wrong_is_said(change: dict[str, np.ndarray | None], words: str)
     np.savez(out, **{name: array for name, array in arrays.items() if array is not None})  # type: ignore[arg-type]
     with pytest.raises(FormatError, match=words):
         opened(Memory("b.npz", {"b.npz": out.getvalue()})).load_all()
+
+
+def test_a_zip_that_is_not_understood_is_no_npz() -> None:
+    data = written(cache(), "a.npz")[0].files["a.npz"]
+    needed = data.index(b"PK\x01\x02") + 6  # the version that is needed to extract the first member
+    later = data[:needed] + b"\xff\x00" + data[needed + 2 :]
+    for name, changed, words in (("a.npz", later, "zip file version 25.5"), ("a.npz", data[:9], "not a zip file")):
+        with pytest.raises(FormatError, match=rf"is no \.npz \(.*{words}"):
+            opened(Memory(name, {name: changed}))
