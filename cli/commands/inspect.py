@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from copy import copy
 from dataclasses import asdict, fields
 from enum import StrEnum
+from functools import partial
 from typing import Annotated, Any
 
 import typer
@@ -188,8 +189,10 @@ def _entry(inspected: Inspected, smooth: Smoothness) -> dict[str, Any]:
     if smooth:
         from cli.reports import continuity_report
 
-        for clip, tracks in zip(entry["clips"], smooth, strict=False):
-            clip["continuity"] = [continuity_report.json(track) for track in tracks]
+        entry["clips"] = [
+            {**_plain_clip(clip), "continuity": [continuity_report.json(track) for track in tracks]}
+            for clip, tracks in zip(inspected.facts.clips, smooth, strict=True)
+        ]
     return entry
 
 
@@ -208,7 +211,7 @@ def _plain(inspected: Inspected) -> dict[str, Any]:
     """Report as JSON values: tracks only if requested, and the first error as text."""
     facts = inspected.facts._asdict()
     faults = facts.pop("faults")
-    facts["clips"] = [_plain_clip(each) for each in inspected.facts.clips]
+    facts["clips"] = [partial(_plain_clip, each) for each in inspected.facts.clips]
     facts["skins"] = [asdict(each) for each in inspected.facts.skins]
     facts["findings"] = [each._asdict() for each in inspected.findings]
     facts["error"] = str(faults[0]) if faults else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from anim.gltf.reading.reader import clip_name
@@ -90,7 +91,7 @@ def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
         "nodes_matched_by_name": found.nodes_by_name,
         "max_error_m": diff.clips[0].error.max_error if diff.clips else 0.0,
         "max_error_percent": _percent(diff.clips[0].error.max_error, diff.diagonal) if diff.clips else 0.0,
-        "clips": [_clip(each, diff.diagonal) for each in diff.clips],
+        "clips": [partial(_clip, each, diff.diagonal) for each in diff.clips],
         "missing_clips": [clip_name(found.old.clips[i], i) for i in diff.missing_clips],
         "added_clips": [clip_name(found.new.clips[i], i) for i in diff.added_clips],
         "missing_nodes": list(diff.missing_nodes),

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import os
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -85,7 +84,7 @@ def measured(data: bytes, ending: str, line: str) -> str:
         (Path(folder) / f"in{ending}").write_bytes(data)
         words = [f"in{ending}" if word == "IN" else word for word in line.split()]
         process = subprocess.Popen(
-            [shutil.which("gltf-anim") or sys.executable, *words], cwd=folder, env=environment(), preexec_fn=_limit,
+            [sys.executable, "-m", "anim", *words], cwd=folder, env=environment(), preexec_fn=_limit,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         _, status, usage = os.wait4(process.pid, 0)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
+from anim.errors import FormatError
 from cli.reports import json_report
 
 
@@ -20,3 +23,22 @@ def test_long_reports_are_a_single_line_of_the_same_content() -> None:
     assert "jämn" in long
     assert json.loads(long) == json.loads(json.dumps(report(longest // 6 + 1)))
     assert json_report.dump(report(longest // 6 - 2)).count("\n") > longest
+
+
+@pytest.mark.parametrize("count", [1, json_report.MAX_INDENTED_VALUES])
+def test_a_function_stands_for_what_it_returns(count: int) -> None:
+    called, plain = ({"clips": [make({"name": "a", "keys": [1, 2.5]})] * count} for make in (_returning, _itself))
+    assert json_report.dump(called) == json_report.dump(plain)
+
+
+def test_a_number_that_json_has_no_form_for_is_found_in_what_a_function_returns() -> None:
+    with pytest.raises(FormatError, match=r"clips\[1\]\.mean is inf"):
+        json_report.dump({"clips": [{}, _returning({"mean": float("inf")})]})
+
+
+def _itself(value: object) -> object:
+    return value
+
+
+def _returning(value: object) -> object:
+    return lambda: value
