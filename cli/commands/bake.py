@@ -88,6 +88,7 @@ def command(
     preset: caches.PresetOption = None,
     depth: caches.DepthOption = None,
     rest_mesh: caches.RestMeshOption = None,
+    max_files: common.MaxFiles = None,
     html: common.Html = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
@@ -138,7 +139,7 @@ def command(
         baked_nodes = [each.node for each in bakeable_instances(scene, rigid=rigid, nodes=nodes)]
         scenes.warn_of_other_scenes(document, source.name, reporter, baked_nodes)
         groups = mesh_groups(scene, nodes, output, rigid=rigid)
-        jobs = bake_jobs(output, ending, groups, [(clips[i].name, i) for i in clip_indices])
+        jobs = bake_jobs(output, ending, groups, [(clips[i].name, i) for i in clip_indices], max_files)
         if html is not None and len(jobs) > 1:
             raise UsageError(f"--html shows one clip and one file, not {len(jobs)} (choose with --clip)")
         lit, mapped = default_directions(document, scene, nodes, ending, rigid=rigid)

@@ -46,6 +46,7 @@ def command(
             "--fps", metavar="N", help="USD: frames per second (default: those of the keys, else 60 and all keys)."
         ),
     ] = None,
+    max_files: common.MaxFiles = None,
     dry_run: common.DryRun = False,
     quiet: common.Quiet = False,
 ) -> int:
@@ -71,10 +72,13 @@ def command(
 
             if embed:
                 raise UsageError("--embed does not apply to USD")
-            skinned_usd.convert_to_usd(input, output, clips=clip, fps=fps, dry_run=dry_run, reporter=reporter)
+            skinned_usd.convert_to_usd(
+                input, output, clips=clip, fps=fps, max_files=max_files, dry_run=dry_run, reporter=reporter
+            )
             return
-        if clip is not None or fps is not None:
-            raise UsageError(f"{'--fps' if clip is None else '--clip'} applies to USD only (.usdz, .usdc, .usda)")
+        for name, value in {"--clip": clip, "--fps": fps, "--max-files": max_files}.items():
+            if value is not None:
+                raise UsageError(f"{name} applies to USD only (.usdz, .usdc, .usda)")
         _convert(input, output, embed=embed, dry_run=dry_run, reporter=reporter)
 
     return many_files.edit_named(

@@ -22,6 +22,7 @@ RESERVED = frozenset(
         *(f"{port}{i}" for port in ("com", "lpt") for i in "0123456789¹²³"),
     )
 )
+MAX_FILES = 2000  # of one command by default: a file of a few megabytes can name 100 000 clips
 MAX_NAME_BYTES = 100  # of 255 in most file systems: the pattern may have several, and words around them
 OF_PATHS = ("path", "folder", "name", "stem")  # of names that follow from an input's
 _is_plain = re.compile(r"[A-Za-z0-9_-]*").fullmatch  # most names, of which nothing is replaced

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from cli.io.output_names import MAX_FILES
+
 Input = Annotated[str, typer.Argument(metavar="IN", help="A .glb or .gltf file, '-' for stdin.", show_default=False)]
 Output = Annotated[
     str, typer.Argument(metavar="OUT", help="A .glb or .gltf file, '-' for stdout (GLB).", show_default=False)
@@ -55,6 +57,16 @@ class Format(StrEnum):
 Report = Annotated[Format, typer.Option("--format", help="Report format: text or one JSON document.")]
 From = Annotated[float | None, typer.Option("--from", metavar="S", help="Start time in seconds.")]
 To = Annotated[float | None, typer.Option("--to", metavar="S", help="End time in seconds.")]
+MaxFiles = Annotated[
+    int | None,
+    typer.Option(
+        "--max-files",
+        metavar="N",
+        min=1,
+        help=f"Names with {{clip}} or {{mesh}}: at most N files, default {MAX_FILES}.",
+        show_default=False,
+    ),
+]
 Html = Annotated[
     str | None,
     typer.Option("--html", metavar="OUT", help="Write a page for the browser, as `view` does: a .html file."),

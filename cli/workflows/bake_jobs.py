@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from anim.errors import UnsupportedError
 from anim.model import Scene
 from anim.skinning.bake import bakeable_instances
 from cli.errors import UsageError
@@ -34,14 +35,29 @@ def mesh_groups(scene: Scene, nodes: Sequence[int] | None, output: str, *, rigid
     return [(name or scene.skeleton.names[node], [node]) for node, name in chosen.items()] or [("", nodes)]
 
 
-def bake_jobs(output: str, ending: str, groups: Sequence[MeshGroup], clips: Sequence[tuple[str, int]]) -> list[BakeJob]:
-    """Return all output files, with their names expanded and checked. clips: name and index of each."""
+def bake_jobs(
+    output: str,
+    ending: str,
+    groups: Sequence[MeshGroup],
+    clips: Sequence[tuple[str, int]],
+    max_files: int | None = None,
+) -> list[BakeJob]:
+    """Return all output files, with their names expanded and checked. clips: name and index of each.
+
+    Raises UnsupportedError if they are more than max_files, by default output_names.MAX_FILES.
+    """
     if "{clip}" not in output and len(clips) > 1:
         raise UsageError(
             f"{len(clips)} clips are chosen, but '{output}' holds one",
             help="choose one with --clip, or put {clip} into OUT for a file per clip",
         )
     each_clip: Sequence[tuple[str, int | None]] = clips or [("", None)]
+    count, most = len(groups) * len(each_clip), max_files or output_names.MAX_FILES
+    if count > most:
+        raise UnsupportedError(
+            f"'{output}' stands for {count} files (limit {most})",
+            help="choose clips with --clip, or raise the limit with --max-files",
+        )
     pairs = [(i, name, clip) for i in range(len(groups)) for name, clip in each_clip]
     rows = [{"mesh": groups[i][0], "clip": name} for i, name, _ in pairs]
     by_clip = "{clip}" in output

@@ -26,7 +26,14 @@ from cli.workflows.bake_jobs import bake_jobs
 
 
 def convert_to_usd(
-    input: str, output: str, *, clips: Sequence[str] | None, fps: float | None, dry_run: bool, reporter: Reporter
+    input: str,
+    output: str,
+    *,
+    clips: Sequence[str] | None,
+    fps: float | None,
+    max_files: int | None,
+    dry_run: bool,
+    reporter: Reporter,
 ) -> None:
     """Write the document at `input` as USD, with one of its clips or a file for each."""
     if not dry_run:
@@ -40,7 +47,7 @@ def convert_to_usd(
         ending = Path(output).suffix.lower()
         meshes = {source.document.json["nodes"][each.node]["mesh"] for each in scene.instances}
         document = self_contained(source.document, source, meshes)
-        jobs = bake_jobs(output, ending, [("", None)], [(found[i].name, i) for i in chosen])
+        jobs = bake_jobs(output, ending, [("", None)], [(found[i].name, i) for i in chosen], max_files)
         for job in jobs:
             played = Clip("", ()) if job.clip is None else found[job.clip]
             label = "" if job.clip is None else reader.clip_label(played.name, job.clip)

@@ -14,12 +14,13 @@ from anim.skinning import chunk_pipeline
 from anim.skinning.analysis.inbetween_error import InbetweenMetric
 from anim.skinning.bake import Baker
 from cli.io import documents
+from cli.io.output_names import MAX_FILES
 from cli.workflows import bake_source_options
 from fixtures.broken.pieces import text
 from tests import many
 from tests.calls import count_calls
 from tests.cli.conftest import Call
-from tests.cli.running import refusal
+from tests.cli.running import help_line, refusal
 from tests.cli.test_many import CLIPS, equal_clips
 from tests.files import opened
 
@@ -60,6 +61,21 @@ def test_files_of_many_clips_are_checked_by_their_folder(
     call("bake", tmp_path / "in.glb", tmp_path / "{clip}.npz").product()
     assert len(counted) == 3
     assert len(list(tmp_path.glob("c*.npz"))) == CLIPS
+
+
+@pytest.mark.parametrize(("command", "ending"), [("bake", "npz"), ("convert", "usda")])
+def test_more_files_than_the_limit_are_refused_before_the_first(
+    call: Call, tmp_path: Path, command: str, ending: str
+) -> None:
+    (tmp_path / "in.glb").write_bytes(many.clips_equal(3))
+    options = ["--rigid"] * (command == "bake")
+    run = call(command, tmp_path / "in.glb", tmp_path / f"{{clip}}.{ending}", *options, "--max-files", "2")
+    assert "stands for 3 files (limit 2)" in refusal(run, 4)
+    assert help_line(run) == "choose clips with --clip, or raise the limit with --max-files"
+    assert not list(tmp_path.glob(f"*.{ending}"))
+    (tmp_path / "in.glb").write_bytes(many.clips_equal(MAX_FILES + 1))
+    run = call(command, tmp_path / "in.glb", tmp_path / f"{{clip}}.{ending}", *options)
+    assert f"(limit {MAX_FILES})" in refusal(run, 4)
 
 
 def test_small_bakes_start_no_threads_and_measure_equal_clips_once(
