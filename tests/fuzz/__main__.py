@@ -1,8 +1,8 @@
 """python -m tests.fuzz [FAMILY ...] [--count N] [--seed S] [--seconds T] [--keep FOLDER]: fuzz the commands.
 
-Families: gltf, euler, cache, usd, springs, bodies, settings, and rigs, whose outputs are judged; all if none is given.
-Runs mutations of fixtures until N of each family are done, or T seconds have passed; prints each new kind of fault,
-and keeps its input in FOLDER, as one JSON file. Such a file in tests/fuzz/found is a test from then on.
+Families: gltf, euler, cache, usd, usd-layers, springs, bodies, settings, and rigs, whose outputs are judged; all if
+none is given. Runs mutations of fixtures until N of each family are done, or T seconds have passed; prints each new
+kind of fault, and keeps its input in FOLDER, as one JSON file. Such a file in tests/fuzz/found is a test from then on.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import zlib
 from collections import Counter
 from pathlib import Path
 
+from tests.fuzz import usd_layers
 from tests.fuzz.execution import BATCH, Job, Outcome, run_jobs
 from tests.fuzz.families import FAMILIES, jobs, look, problems, sound_jobs
 
@@ -73,7 +74,8 @@ def warm(family: str) -> None:
                 (Path(folder) / name).write_bytes(data)
             os.chdir(folder)
             with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.TextIOWrapper(io.BytesIO())):
-                code = command.run(list(job.line))
+                is_layer = job.line[0] == usd_layers.NAME
+                code = usd_layers.run(job.line) if is_layer else command.run(list(job.line))
             if code in (1, 3):  # others have reasons: a fixture without a skin
                 raise SystemExit(f"{' '.join(job.line)} of a sound file: exit code {code}")
             os.chdir(here)

@@ -18,6 +18,7 @@ COUNTS = {  # mutations; 10 to 30 s each
     "euler": 6000,
     "cache": 2000,
     "usd": 60,
+    "usd-layers": 1000,
     "springs": 800,
     "bodies": 800,
     "settings": 1600,
