@@ -18,7 +18,7 @@ from anim.optimization.clip_batches import batch_clips
 from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, VerificationRequest, optimize_clips
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
-from anim.optimization.rest_pose import rebase
+from anim.optimization.rest_pose import RebasedDocument, rebase
 from anim.optimization.search.plan import Solution
 from anim.optimization.shared_constants import find_constants
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
@@ -44,11 +44,6 @@ class Optimized:
     without_loss: tuple[int, ...] = ()
     unchanged: bool = False
 
-    def sizes(self, request: Request) -> dict[int, float]:
-        """Return the approximate number of bytes of each solution of a request, by index of the clip."""
-        coding = Encoding(request.packing, BYTE_COSTS[request.objective])
-        return {number: each.size(coding) for number, each in self.solutions.items()}
-
 
 def optimize(
     document: Document,
@@ -61,14 +56,16 @@ def optimize(
     start: str = "spawn",
     detailed: bool = False,
     verified: bool = True,
+    earlier: Mapping[int, ClipResult] | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Optimized:
     """Return the document with smaller animations, each within the bounds as measured on the written data.
 
     scene, clips: of the document. chosen: indices of the clips to optimize, all by default. workers: number of
     processes; the result is the same for any number. start: start method of `multiprocessing`. detailed: verifications
-    with statistics. verified: whether errors are measured; without, only sizes are of use. progress: called with the
-    fraction done.
+    with statistics. verified: whether errors are measured; without, only sizes are of use. earlier: results of `search`
+    within bounds that are no larger, by index of the clip; these clips are not searched again. progress: called with
+    the fraction done.
     A clip without a lossy solution within all bounds is stored losslessly. Output of the same request comes back
     unchanged.
     """
@@ -77,25 +74,8 @@ def optimize(
     if writing.has_mark(document, clips, options):
         return Optimized(document, {}, {}, unchanged=True)
     _check_durations(clips, chosen)
-    request = _visible_clips(request, scene)
-    base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
-    after = base.scene if base else scene
-    optimizer = ClipOptimizer(request, scene, after, tuple(clips), detailed=detailed, verified=verified)
-    tasks = _tasks(optimizer, chosen)
-    first = _first_equal(tasks)
-    distinct = [task for n, task in enumerate(tasks) if first[n] == n]
-
-    def name(item: tuple[int, object]) -> str:
-        return reader.clip_label(clips[item[0]].name, item[0])
-
-    found: dict[int, ClipResult] = {}
-    batches = batch_clips(distinct, optimizer.dividers[0])
-    with process_pool(min(workers, len(batches)), optimizer, start=start) as pool:
-        results = pool.each(optimize_clips, batches, label=lambda batch: name(batch[0]), work=_work)
-        for batch, some in zip(batches, results, strict=True):
-            found.update(zip((number for number, _ in batch), some, strict=True))
-            progress(len(found) / len(distinct))
-    found = {number: found[tasks[first[n]][0]] for n, (number, _) in enumerate(tasks)}
+    base, optimizer = _prepare(document, scene, clips, request, detailed=detailed, verified=verified)
+    found = _results(optimizer, chosen, earlier or {}, workers, start, progress)
     solutions = {number: each.solution.named(clips[number].name) for number, each in found.items()}
     verdicts = {number: each.verdict for number, each in found.items()}
     without_loss = [number for number, each in found.items() if each.without_loss]
@@ -105,6 +85,69 @@ def optimize(
         (verdicts[number],) = optimizer.verify([VerificationRequest(number, read_back[number])])
     done = writing.add_mark(new, read_back, options)
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
+
+
+def search(
+    document: Document,
+    scene: Scene,
+    clips: Sequence[Clip],
+    request: Request,
+    *,
+    chosen: Sequence[int],
+    workers: int = 1,
+    start: str = "spawn",
+    detailed: bool = False,
+    verified: bool = True,
+    progress: Callable[[float], None] = lambda _: None,
+) -> dict[int, ClipResult]:
+    """Return the results that `optimize` writes, by index of the clip; arguments as there."""
+    _check_durations(clips, chosen)
+    _, optimizer = _prepare(document, scene, clips, request, detailed=detailed, verified=verified)
+    return _results(optimizer, chosen, {}, workers, start, progress)
+
+
+def sizes(results: Mapping[int, ClipResult], request: Request) -> dict[int, float]:
+    """Return the approximate number of bytes of each result of a request, by index of the clip."""
+    coding = Encoding(request.packing, BYTE_COSTS[request.objective])
+    return {number: each.solution.size(coding) for number, each in results.items()}
+
+
+def _prepare(
+    document: Document, scene: Scene, clips: Sequence[Clip], request: Request, *, detailed: bool, verified: bool
+) -> tuple[RebasedDocument | None, ClipOptimizer]:
+    """The document and scene with another rest pose, if it may change, and the optimizer of all clips."""
+    request = _visible_clips(request, scene)
+    base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
+    after = base.scene if base else scene
+    return base, ClipOptimizer(request, scene, after, tuple(clips), detailed=detailed, verified=verified)
+
+
+def _results(
+    optimizer: ClipOptimizer,
+    chosen: Sequence[int],
+    earlier: Mapping[int, ClipResult],
+    workers: int,
+    start: str,
+    progress: Callable[[float], None],
+) -> dict[int, ClipResult]:
+    """The result of each chosen clip; equal clips are searched once, and those with earlier results not at all."""
+    waiting = [number for number in chosen if number not in earlier]
+    tasks = _tasks(optimizer, waiting) if waiting else []
+    first = _first_equal(tasks)
+    distinct = [task for n, task in enumerate(tasks) if first[n] == n]
+
+    def name(item: tuple[int, object]) -> str:
+        return reader.clip_label(optimizer.clips[item[0]].name, item[0])
+
+    found: dict[int, ClipResult] = {}
+    batches = batch_clips(distinct, optimizer.dividers[0]) if distinct else []
+    with process_pool(min(workers, len(batches)), optimizer, start=start) as pool:
+        results = pool.each(optimize_clips, batches, label=lambda batch: name(batch[0]), work=_work)
+        for batch, some in zip(batches, results, strict=True):
+            found.update(zip((number for number, _ in batch), some, strict=True))
+            progress(len(found) / len(distinct))
+    found = {number: found[tasks[first[n]][0]] for n, (number, _) in enumerate(tasks)}
+    return {number: earlier[number] if number in earlier else found[number] for number in chosen}
 
 
 def _first_equal(tasks: Sequence[tuple[int, Task]]) -> list[int]:

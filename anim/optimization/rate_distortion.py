@@ -15,6 +15,7 @@ TABLE_FACTOR = TABLE_FRACTIONS[1] / TABLE_FRACTIONS[0]
 FIRST_ENTRY, FIRST_STEP = 12, 4  # of the table: 1e-3 of the diagonal, and its neighbors a decade apart
 FIRST_FRACTION = TABLE_FRACTIONS[FIRST_ENTRY]
 MIN_SIZE_RATIO = 0.98  # of animation bytes at a smaller bound to those at a larger one; else they are not verifiable
+EXACT_SIZE_RATIO = 1.25  # of bytes without error to those at the first entry; where fewer are left, they are not tried
 SIZE_MARGIN = 3e-3  # of the animation's bytes: sizes between two entries are estimates
 BOUND_STEP_FACTOR = 1.05  # between the bounds that a search may return
 BOUND_EXPONENT_PER_SIZE = 16.0  # a bound 17 % larger saves about a percent of the animation's bytes
@@ -43,33 +44,53 @@ def curve(
 
 
 def smallest_bound(
-    max_bytes: int,
-    diagonal: float,
-    sized: Callable[[float], RatePoint],
-    ratio: Callable[[float], float],
-    *,
-    usual_ratio: float = 1.0,
+    max_bytes: int, diagonal: float, sized: Callable[[float], RatePoint], *, ratio: float = 1.0
 ) -> float | None:
     """Return the smallest bound, m, whose result is likely to take at most `max_bytes`; None if there is none.
 
-    sized: size at a bound, from a quick search. ratio: animation bytes of the final search as a fraction of those, at a
-    bound. usual_ratio: the same before any was measured. Sizes are tried at bounds of one table only, and in between
-    estimated from its neighbors, so that the result never increases with `max_bytes`.
+    sized: size at a bound, from a quick search. ratio: animation bytes of the final search as a fraction of those.
+    Sizes are tried at bounds of one table only, and in between estimated from its neighbors, so that the result never
+    increases with `max_bytes`.
     """
-    if sized(0.0).size <= max_bytes:
-        return 0.0
     if not diagonal:
-        return None
+        return 0.0 if sized(0.0).size <= max_bytes else None
     table = _SizeTable(diagonal, sized)
-    last = len(TABLE_FRACTIONS) - 1
-    first = _first_entry(
-        lambda entry, larger: table.size(entry, usual_ratio) <= max_bytes and table.is_plausible(entry, larger)
+    first = table.point(FIRST_ENTRY)
+    is_roomy = max_bytes - first.size >= (EXACT_SIZE_RATIO - 1) * first.animation
+    if is_roomy and sized(0.0).size <= max_bytes:
+        return 0.0
+    entry = _first_entry(
+        lambda entry, larger: table.size(entry, ratio) <= max_bytes and table.is_plausible(entry, larger)
     )
-    for entry in range(first, last + 1):
-        bound = table.bound_before(entry, max_bytes, ratio(table.bound(entry)))
+    if not table.has_larger(entry, max_bytes, ratio) and sized(0.0).size <= max_bytes:
+        return 0.0
+    for each in range(entry, len(TABLE_FRACTIONS)):
+        bound = table.bound_before(each, max_bytes, ratio)
         if bound is not None:
-            return min(_rounded(bound, diagonal), table.bound(entry))
+            return min(_rounded(bound, diagonal), table.bound(each))
+    last = len(TABLE_FRACTIONS) - 1
     return table.bound(last) if table.size(last, 1.0) <= max_bytes else None
+
+
+def local_exponent(bound: float, points: Sequence[RatePoint]) -> float:
+    """Return the exponent n around a bound, m, where animation bytes are as bound^(-1/n) between the nearest points."""
+    low = max((each for each in points if 0 < each.max_error <= bound), key=lambda each: each.max_error, default=None)
+    high = min((each for each in points if each.max_error > bound), key=lambda each: each.max_error, default=None)
+    if low is None or high is None or low.animation <= high.animation:
+        return BOUND_EXPONENT_PER_SIZE
+    found = math.log(high.max_error / low.max_error) / math.log(low.animation / max(high.animation, 1))
+    return min(max(found, BOUND_EXPONENT_PER_SIZE / 4), 2 * BOUND_EXPONENT_PER_SIZE)
+
+
+def bound_for(excess: float, bound: float, diagonal: float, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
+    """Return the bound, m, at which what takes `excess` times the bytes available at a bound is likely to fit."""
+    factor = excess**exponent
+    return _rounded(bound * min(max(factor, 1 / MAX_STEP_FACTOR), MAX_STEP_FACTOR), diagonal)
+
+
+def size_at(size: float, bound: float, other: float, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
+    """Return the bytes to expect at another bound above 0 of what takes `size` at a bound, as it does at 0."""
+    return float(size * (bound / other) ** (1 / exponent)) if bound else size
 
 
 def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) -> float:
@@ -80,13 +101,13 @@ def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) 
     return _rounded(max(bound, MIN_BOUND_PER_DIAGONAL * diagonal) * factor, diagonal)
 
 
-def bound_below(point: RatePoint, max_bytes: int) -> float:
+def bound_below(point: RatePoint, max_bytes: int, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
     """Return a bound, m, that is likely too small, where a result leaves bytes unused.
 
     Its geometric mean with the result's own bound is the one that is likely to use them all.
     """
     excess = min(1 + (max_bytes - point.size) / max(point.animation, 1), 2.0)
-    factor = min(max(excess ** (2 * BOUND_EXPONENT_PER_SIZE), TABLE_FACTOR), MAX_STEP_FACTOR**2)
+    factor = min(max(excess ** (2 * exponent), TABLE_FACTOR), MAX_STEP_FACTOR**2)
     return float(point.max_error / factor)
 
 
@@ -110,27 +131,32 @@ class _SizeTable:
 
     def size(self, entry: int, ratio: float) -> float:
         """Return the bytes of the file if its animation takes `ratio` times those of the quick search."""
-        point = self._point(entry)
+        point = self.point(entry)
         return point.size - (1 - ratio) * point.animation
 
     def is_plausible(self, entry: int, larger: int) -> bool:
         """Return whether an entry has as many bytes as a larger one; less come of a search that misses its bound."""
         if larger not in self._found:
             return True
-        return self._point(entry).animation >= MIN_SIZE_RATIO * self._point(larger).animation
+        return self.point(entry).animation >= MIN_SIZE_RATIO * self.point(larger).animation
+
+    def has_larger(self, entry: int, max_bytes: int, ratio: float) -> bool:
+        """Return whether a smaller bound that was tried takes too many bytes: without error they are more still."""
+        smaller = (each for each in self._found if each < entry)
+        return any(self.size(each, ratio) > max_bytes and self.is_plausible(each, entry) for each in smaller)
 
     def bound_before(self, entry: int, max_bytes: int, ratio: float) -> float | None:
         """Return the bound, m, of `max_bytes` between an entry and the one before; None above the entry.
 
         Animation bytes are linear in between, both logarithmic.
         """
-        high = self._point(entry)
+        high = self.point(entry)
         limit = max_bytes - SIZE_MARGIN * high.animation - (high.size - high.animation)
         if ratio * high.animation > limit:
             return None
         if not entry:
             return self.bound(entry)
-        low = self._point(entry - 1)
+        low = self.point(entry - 1)
         if not self.is_plausible(entry - 1, entry):
             return self.bound(entry)
         if ratio * low.animation <= limit:
@@ -138,7 +164,8 @@ class _SizeTable:
         fraction = math.log(ratio * low.animation / limit) / math.log(low.animation / high.animation)
         return float(self.bound(entry - 1) * (self.bound(entry) / self.bound(entry - 1)) ** fraction)
 
-    def _point(self, entry: int) -> RatePoint:
+    def point(self, entry: int) -> RatePoint:
+        """Return what the quick search gives at an entry."""
         if entry not in self._found:
             self._found[entry] = self._sized(self.bound(entry))
         return self._found[entry]

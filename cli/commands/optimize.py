@@ -203,7 +203,7 @@ def command(
                 found = work.run(wanted)
             else:
                 ceiling = None if max_error is None else wanted.bounds.max_error
-                wanted, found = ByteLimit(work, max_count).run(wanted, ceiling=ceiling)
+                wanted, found = ByteLimit(work, max_count, wanted, ceiling).run()
             optimize_report.check(found, work.clips, wanted, work.scale)
             about = optimize_outputs.describe(work, wanted, found, began)
             with optimize_outputs.write_report(about, reporter, report, dry_run=dry_run):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from anim.files import signals
 from anim.gltf.document import Document
@@ -16,7 +18,8 @@ from anim.gltf.reading.accessors import Accessors
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
-from anim.optimization.optimize import Optimized, optimize
+from anim.optimization.clip_optimizer import ClipResult
+from anim.optimization.optimize import Optimized, optimize, search
 from anim.optimization.options import Bounds, Request
 from anim.optimization.rate_distortion import RatePoint
 from anim.units import is_zero
@@ -47,24 +50,33 @@ class OptimizeJob:
     detailed: bool
     progress: Progress
 
-    def run(self, request: Request, *, chosen: Sequence[int] | None = None, verified: bool = True) -> Optimized:
-        """Return the result of the search. chosen: indices of the clips, if not all of the job's."""
-        chosen = self.chosen if chosen is None else chosen
-        with signals.ignore_broken_pipes():
-            found = optimize(
-                self.source.document,
-                self.scene,
-                self.clips,
-                request,
-                chosen=chosen,
-                workers=self.workers if optimize_report.is_long(self.clips, chosen) else 1,
-                detailed=self.detailed and verified,
-                verified=verified,
-                start="fork" if sys.platform == "linux" else "spawn",
-                progress=lambda share: self.progress(round(1000 * share)),
+    def run(
+        self, request: Request, *, verified: bool = True, earlier: Mapping[int, ClipResult] | None = None
+    ) -> Optimized:
+        """Return the document with the result of the search. earlier: results of clips that are not searched again."""
+        searched = [i for i in self.chosen if i not in (earlier or {})]
+        with self._options(searched, verified=verified) as options:
+            return optimize(
+                self.source.document, self.scene, self.clips, request, chosen=self.chosen, earlier=earlier, **options
             )
+
+    def search(self, request: Request, chosen: Sequence[int], *, verified: bool = True) -> dict[int, ClipResult]:
+        """Return the results of some clips."""
+        with self._options(chosen, verified=verified) as options:
+            return search(self.source.document, self.scene, self.clips, request, chosen=chosen, **options)
+
+    @contextmanager
+    def _options(self, searched: Sequence[int], *, verified: bool) -> Iterator[dict[str, Any]]:
+        """Provide how clips are searched, with the progress shown."""
+        with signals.ignore_broken_pipes():
+            yield {
+                "workers": self.workers if optimize_report.is_long(self.clips, searched) else 1,
+                "start": "fork" if sys.platform == "linux" else "spawn",
+                "detailed": self.detailed and verified,
+                "verified": verified,
+                "progress": lambda share: self.progress(round(1000 * share)),
+            }
         self.progress.close()
-        return found
 
     def result(self, found: Optimized) -> tuple[Document, int]:
         """Return the optimized document, or the source if that takes no more bytes, with its size in bytes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,22 +57,74 @@ def test_a_search_that_ends_elsewhere_still_fits(
 def test_one_full_search_with_verification(
     fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All sizes before it come from fast searches whose errors are not measured, or from a few of the clips."""
-    runs, run = [], OptimizeJob.run
-
-    def counted(job: OptimizeJob, request: Request, **options: Any) -> Optimized:
-        runs.append((request.effort, options.get("verified", True), len(options.get("chosen", job.chosen))))
-        return run(job, request, **options)
-
-    monkeypatch.setattr(OptimizeJob, "run", counted)
+    """All sizes before it come from fast searches whose errors are not measured."""
+    searched = _count_searches(monkeypatch)
     source, output = fixture("noop"), tmp_path / "out.glb"
     assert call("optimize", source, output, "--max-bytes", "5550").code == 0
-    clips = len(container.read(source.read_bytes()).json["animations"])
     assert output.stat().st_size <= 5550
-    assert [each for each in runs if each[1]] == [("balanced", True, clips)]
-    assert sum(each[0] == "balanced" for each in runs) <= 3
-    assert all(count <= -(-clips // 4) for effort, verified, count in runs if effort == "balanced" and not verified)
-    assert len(runs) <= 9
+    clips = len(container.read(source.read_bytes()).json["animations"])
+    assert [count for effort, verified, count in searched if verified] == [clips]
+    assert {effort for effort, verified, _ in searched if not verified} == {"fast"}
+    assert len(searched) <= 9
+
+
+@pytest.mark.parametrize("percent", ["0.02", "0.3"])
+def test_many_clips_are_searched_little_more_than_once(
+    percent: str, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sample comes first; the others' bounds follow from its bytes, and the bytes too many from a few clips."""
+    source, at_bound, output = tmp_path / "in.glb", tmp_path / "bound.glb", tmp_path / "out.glb"
+    source.write_bytes(_swaying_clips(24))
+    assert call("optimize", source, at_bound, "--max-error", f"{percent}%").code == 0
+    limit = at_bound.stat().st_size
+    searched = _count_searches(monkeypatch)
+    run = call("optimize", source, output, "--max-bytes", str(limit), "--report", "-")
+    assert output.stat().st_size <= limit
+    verified = [count for effort, is_verified, count in searched if is_verified and effort == "balanced"]
+    assert verified[0] == 4
+    assert sum(verified) <= 2 * 24
+    assert apart(call, source, output)["max_error_percent"] <= 1.6 * float(percent)
+    assert max(each["max_error_m"] for each in run.json["clips"]) > 0
+    assert call("optimize", output, tmp_path / "again.glb", "--max-bytes", str(limit)).code == 0
+    assert (tmp_path / "again.glb").stat().st_size <= limit
+
+
+def _count_searches(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool, int]]:
+    """Effort, whether errors are measured, and number of clips of each search from now on."""
+    searched: list[tuple[str, bool, int]] = []
+    run, search = OptimizeJob.run, OptimizeJob.search
+
+    def counted(job: OptimizeJob, request: Request, **options: Any) -> Optimized:
+        if not options.get("earlier"):
+            searched.append((request.effort, options.get("verified", True), len(job.chosen)))
+        return run(job, request, **options)
+
+    def counted_some(job: OptimizeJob, request: Request, chosen: Sequence[int], **options: Any) -> Any:
+        searched.append((request.effort, options.get("verified", True), len(chosen)))
+        return search(job, request, chosen, **options)
+
+    monkeypatch.setattr(OptimizeJob, "run", counted)
+    monkeypatch.setattr(OptimizeJob, "search", counted_some)
+    return searched
+
+
+def _swaying_clips(count: int) -> bytes:
+    """A triangle that sways about an axis, in many clips of 60 keys, each with other waves."""
+    times = np.arange(60) / 30
+    chosen = np.random.default_rng(7)
+    angles = sum(
+        chosen.uniform(0.1, 0.6, (count, 1)) * np.sin(times * rate + chosen.uniform(0, 6, (count, 1))) / rate
+        for rate in (2, 5, 11, 23)
+    )
+    zeros = np.zeros_like(angles)
+    keys = np.stack([zeros, zeros, np.sin(angles / 2), np.cos(angles / 2)], axis=-1)
+    corners = ("VEC3", 5126, np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]))
+    arrays = buffered(("SCALAR", 5126, times), corners, *[("VEC4", 5126, each) for each in keys])
+    channels = [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}]
+    clips = [{"name": f"c{i}", "samplers": [{"input": 0, "output": 2 + i}], "channels": channels} for i in range(count)]
+    nodes = {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "a", "mesh": 0}]}
+    meshes = {"meshes": [{"primitives": [{"attributes": {"POSITION": 1}}]}]}
+    return glb(json.dumps({"asset": {"version": "2.0"}, **nodes, **meshes, **arrays, "animations": clips}).encode())
 
 
 def test_unused_bytes_are_worth_another_search(

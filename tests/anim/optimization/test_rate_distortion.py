@@ -11,6 +11,7 @@ import pytest
 
 from anim.optimization.rate_distortion import (
     ERROR_FRACTIONS,
+    FIRST_FRACTION,
     MAX_BOUND_PER_DIAGONAL,
     MIN_BOUND_PER_DIAGONAL,
     RatePoint,
@@ -44,11 +45,6 @@ def test_a_curve_goes_from_small_bounds_to_large() -> None:
     assert [each.max_error for each in curve(1.0, _sized, (0.3, 0.1))] == [0.1, 0.3]
 
 
-def _even(_: float) -> float:
-    """A full search that gives the same bytes as a quick one."""
-    return 1.0
-
-
 @pytest.mark.parametrize("sized", [_sized, _with_meshes])
 @pytest.mark.parametrize("ratio", [1.0, 0.98])
 @pytest.mark.parametrize("share", [3e-6, 1e-4, 7e-4, 0.02])
@@ -60,7 +56,7 @@ def test_the_smallest_bound_that_fits(share: float, ratio: float, sized: Callabl
         return point.size - (1 - ratio) * point.animation
 
     limit = math.ceil(full(share * DIAGONAL))
-    found = smallest_bound(limit, DIAGONAL, sized, lambda _: ratio, usual_ratio=ratio)
+    found = smallest_bound(limit, DIAGONAL, sized, ratio=ratio)
     assert found is not None
     assert full(found) <= limit
     assert share * 0.995 <= found / DIAGONAL <= 1.12 * share
@@ -73,15 +69,15 @@ def test_without_error_where_that_fits() -> None:
         asked.append(max_error)
         return _sized(max_error)
 
-    assert smallest_bound(10**6, DIAGONAL, tried, _even) == 0
-    assert asked == [0.0]
+    assert smallest_bound(10**6, DIAGONAL, tried) == 0
+    assert sorted(asked) == pytest.approx([0.0, FIRST_FRACTION * DIAGONAL])
 
 
 def test_nothing_fits_too_few_bytes() -> None:
     smallest = _sized(MAX_BOUND_PER_DIAGONAL * DIAGONAL).size
-    assert smallest_bound(smallest - 1, DIAGONAL, _sized, _even) is None
-    assert smallest_bound(smallest, DIAGONAL, _sized, _even) == pytest.approx(MAX_BOUND_PER_DIAGONAL * DIAGONAL)
-    assert smallest_bound(1000, 0.0, _sized, _even) is None
+    assert smallest_bound(smallest - 1, DIAGONAL, _sized) is None
+    assert smallest_bound(smallest, DIAGONAL, _sized) == pytest.approx(MAX_BOUND_PER_DIAGONAL * DIAGONAL)
+    assert smallest_bound(1000, 0.0, _sized) is None
     assert ERROR_FRACTIONS[0] > MIN_BOUND_PER_DIAGONAL
 
 
@@ -94,14 +90,14 @@ def test_fewer_bytes_at_small_bounds_are_not_believed(ratio: float) -> None:
         return RatePoint(max_error, size, max_error, size)
 
     limit = math.ceil(ratio * _sized(1.2e-4 * DIAGONAL).size)
-    found = smallest_bound(limit, DIAGONAL, missed, lambda _: ratio, usual_ratio=ratio)
+    found = smallest_bound(limit, DIAGONAL, missed, ratio=ratio)
     assert found is not None
     assert 1e-4 <= found / DIAGONAL <= 1.5e-4
 
 
-@pytest.mark.parametrize("usual_ratio", [1.0, 0.97])
-def test_more_bytes_never_give_a_larger_bound(usual_ratio: float) -> None:
-    """Though sizes and ratios are noisy: by 9 %, far more than those of real files."""
+@pytest.mark.parametrize("ratio", [1.0, 0.97])
+def test_more_bytes_never_give_a_larger_bound(ratio: float) -> None:
+    """Though sizes are noisy: by 9 %, far more than those of real files."""
 
     def noise(max_error: float) -> float:
         return random.Random(f"{max_error:.6g}").random()
@@ -111,13 +107,7 @@ def test_more_bytes_never_give_a_larger_bound(usual_ratio: float) -> None:
         size = round(plain.size * (1 + 0.09 * noise(max_error)))
         return RatePoint(max_error, size, max_error, size - 300)
 
-    def ratio(max_error: float) -> float:
-        return 0.95 + 0.05 * noise(max_error / 2)
-
-    found = [
-        smallest_bound(limit, DIAGONAL, noisy, ratio, usual_ratio=usual_ratio) or math.inf
-        for limit in range(1400, 4200, 3)
-    ]
+    found = [smallest_bound(limit, DIAGONAL, noisy, ratio=ratio) or math.inf for limit in range(1400, 4200, 3)]
     assert found == sorted(found, reverse=True)
     assert len(set(found)) > 30
 
@@ -130,7 +120,7 @@ def test_few_searches_find_the_bound(share: float) -> None:
         asked.append(max_error)
         return _sized(max_error)
 
-    smallest_bound(_sized(share * DIAGONAL).size, DIAGONAL, tried, _even)
+    smallest_bound(_sized(share * DIAGONAL).size, DIAGONAL, tried)
     assert len(asked) == len(set(asked)) <= 8
 
 
