@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -103,8 +104,8 @@ def _bound(part: SkinnedGroups | ShellPoints) -> BoundGroups:
     bound = part.bound_groups
     missing = NUM_CORNERS - bound.corners.shape[1]
     if missing <= 0 or not len(bound.corners):
-        return bound._replace(corners=bound.corners.reshape(-1, NUM_CORNERS, 3))
-    return bound._replace(corners=np.concatenate((bound.corners, bound.corners[:, :missing]), axis=1))
+        return replace(bound, corners=bound.corners.reshape(-1, NUM_CORNERS, 3))
+    return replace(bound, corners=np.concatenate((bound.corners, bound.corners[:, :missing]), axis=1))
 
 
 def _nodes(part: SkinnedGroups | ShellPoints, version: int) -> Ints:

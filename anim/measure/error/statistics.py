@@ -81,7 +81,7 @@ def statistics(
     every = found.pop() if len(found) == 1 else np.concatenate(found)
     found.clear()
     speed = speed_error(ruler, before, after, player=player, fps=fps, block=block)
-    mean = float(every.sum()) / (len(every) + zeros)
+    mean = float(every.sum(dtype=np.float64)) / (len(every) + zeros)
     return Statistics(mean, _percentile(every, zeros, 0.99), angle, speed, weight)
 
 

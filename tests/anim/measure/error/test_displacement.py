@@ -11,6 +11,7 @@ from anim.measure.error.displacement import (
     DisplacementRate,
     SkinnedDisplacement,
     lengths,
+    lengths_by_group,
     max_displacement,
 )
 
@@ -82,3 +83,12 @@ def test_the_joint_that_moves_a_vertex_most_is_named(field: SkinnedDisplacement)
             for k, j in ((0, 2), (1, 3))
         ]
         assert field.joint(2, frame, 4) == (2, 3)[int(np.argmax(single))]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-9, 1e16])
+def test_statistics_have_the_lengths_in_single_precision(field: SkinnedDisplacement, scale: float) -> None:
+    """But for lengths whose squares do not fit into float32."""
+    scaled = SkinnedDisplacement(field._groups, scale * field._moved)
+    found = np.concatenate(list(lengths_by_group(scaled, 3, np.arange(FRAMES))))
+    assert found.dtype == (np.float64 if scale > 1 else np.float32)
+    np.testing.assert_allclose(found, np.concatenate([each.ravel() for each in _all(scaled, FRAMES)]), rtol=3e-6)

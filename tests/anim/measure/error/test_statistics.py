@@ -79,9 +79,9 @@ def test_a_plain_loop_finds_the_same(versions: tuple[Scene, Clip, Clip]) -> None
     found = statistics(ErrorMetric(scene), before, after, times=times)
     apart = np.array([[np.linalg.norm(v) for v in _apart(scene, before, after, time)] for time in times])
     assert apart.max() > 0.001
-    assert found.mean == pytest.approx(apart.mean(), rel=1e-9)
+    assert found.mean == pytest.approx(apart.mean(), rel=1e-6)
     ordered = np.sort(apart.reshape(-1))
-    assert found.p99 == pytest.approx(ordered[int(np.ceil(0.99 * len(ordered))) - 1], rel=1e-9)
+    assert found.p99 == pytest.approx(ordered[int(np.ceil(0.99 * len(ordered))) - 1], rel=1e-6)
     assert statistics(ErrorMetric(scene, shell=0.01), before, after, times=times).mean == found.mean
     largest = ErrorMetric(scene).error_at(before, after, times)
     assert apart.max() - 1e-12 <= largest.max_error <= 1.001 * apart.max()
@@ -121,7 +121,7 @@ def test_blocks_don_t_show(versions: tuple[Scene, Clip, Clip], monkeypatch: pyte
     assert len(list(ErrorMetric(scene).blocks(before, after, times))) > 10
     parts = ErrorMetric(scene, shell=0.01).error_at(before, after, times), statistics(ErrorMetric(scene), before, after)
     assert parts[0].max_error == pytest.approx(whole[0].max_error, rel=1e-3)
-    assert parts[1].mean == pytest.approx(whole[1].mean, rel=1e-12)
+    assert parts[1].mean == pytest.approx(whole[1].mean, rel=1e-6)
     assert parts[1].speed.size == pytest.approx(whole[1].speed.size, rel=0.01)
     assert parts[1].angle == whole[1].angle
 
