@@ -46,6 +46,7 @@ _STYLE: dict[str, Any] = {
     "path.simplify": True,
     "agg.path.chunksize": 0,
 }
+MAX_CHARACTERS = 300
 INSTALL = "pip install 'gltf-anim[plot]'"
 
 
@@ -77,6 +78,7 @@ class Figure:
     def text(self, x: float, y: float, words: str, **style: Any) -> float:
         """Write text with its first baseline at x, y, and return its width in inches."""
         style = {"fontsize": TEXT, "va": "baseline", "ha": "left", "parse_math": False, **style}
+        words = _shorten(words)
         self.figure.text(x / self.width, 1 - (self.offset + y) / self.height, words, **style)
         return text_width(words, style["fontsize"], style.get("weight", "normal"))
 
@@ -121,8 +123,13 @@ def text_width(words: str, points: float, weight: str = "normal") -> float:
     from matplotlib.textpath import text_to_path
 
     font = FontProperties(weight=weight, size=points)
-    width, _, _ = text_to_path.get_text_width_height_descent(words, font, ismath=False)
+    width, _, _ = text_to_path.get_text_width_height_descent(_shorten(words), font, ismath=False)
     return float(width) / POINTS
+
+
+def _shorten(words: str) -> str:
+    """The start of a text that is wider than any figure; a name of a file can have 100 000 characters."""
+    return words if len(words) <= MAX_CHARACTERS else words[: MAX_CHARACTERS - 1] + "…"
 
 
 def format_number(number: float) -> str:

@@ -185,11 +185,20 @@ def _draw_lines(axes: Axes, each: PlotTrack, line: Polyline, origin: Floats, **l
     if not len(line.times):
         return
     colored = each.colored
-    others = [c for c in range(line.values.shape[1]) if c not in colored]
-    by_range = sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c]))))
-    for c in (*others, *by_range):
-        chosen = {"linewidth": 0.6, "alpha": 0.7, "zorder": 1.5} if c in others else look
-        axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **chosen)
+    others = np.setdiff1d(np.arange(line.values.shape[1]), colored)
+    if len(others):
+        _draw_gray(axes, line.times, line.values[:, others] - origin[others])
+    for c in sorted(colored, key=lambda c: float(np.ptp(np.nan_to_num(line.values[:, c])))):
+        axes.plot(line.times, line.values[:, c] - origin[c], color=_color(each, c), **look)
+
+
+def _draw_gray(axes: Axes, times: Floats, values: Floats) -> None:
+    """Draw components (T, C) without a color of their own; a line each takes seconds for thousands."""
+    from matplotlib.collections import LineCollection
+
+    points = np.stack(np.broadcast_arrays(times[:, None], values), axis=-1)  # (T, C, 2)
+    look = {"linewidths": 0.6, "alpha": 0.7, "zorder": 1.5, "capstyle": "round", "joinstyle": "round"}
+    axes.add_collection(LineCollection(list(np.swapaxes(points, 0, 1)), colors=HAIR, **look))
 
 
 def _handles(axes: Axes, each: PlotTrack, front: Track, origin: Floats) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Bools, Floats
 from anim.errors import AnimError, FormatError, RangeError
-from anim.maths import matrix, quaternion
+from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Skeleton
+from anim.model.skeleton import nearest_ancestors
 from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription, Shape, Vector
 from anim.simulation.rigid_bodies.rigid_scene import (
     WORLD,
@@ -39,22 +40,41 @@ def assemble(
     if not description.motions:
         raise RangeError("there is no body to simulate", help="name some with `body`")
     tracked = {track.node for track in clip.tracks if track.path in ("translation", "rotation", "scale")}
-    owners = {node: find_owner(skeleton, node, description) for node in description.colliders}
-    frames = [_frame(each) for each in world]
+    is_tracked = hierarchy.with_descendants(skeleton.parents, node_mask(skeleton, tracked))
+    owned = _colliders_by_owner(description, skeleton)
+    positions, rotations, _, _ = matrix.decompose(world)
+    frames = [Frame(*each) for each in zip(positions, rotations, strict=True)]
     bodies = []
     for node, motion in description.motions.items():
-        own = [each for each, owner in owners.items() if owner == node]
+        own = owned.get(node, [])
         kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
         kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
-        bodies.append(_body(node, kind, motion, own, description, skeleton, frames[node], world))
-    for node in [each for each, owner in owners.items() if owner < 0]:
-        kind = BodyKind.ANIMATED if tracked & set(ancestors(skeleton, node)) else BodyKind.STATIC
-        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames[node], world))
+        bodies.append(_body(node, kind, motion, own, description, skeleton, frames, world))
+    for node in owned.get(-1, []):
+        kind = BodyKind.ANIMATED if is_tracked[node] else BodyKind.STATIC
+        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames, world))
     indices = {body.node: i for i, body in enumerate(bodies)}
     joints = tuple(_joints(description, skeleton, indices, frames))
     if description.floor is not None:
         bodies.append(_floor(description))
     return RigidScene(tuple(bodies), joints, gravity)
+
+
+def node_mask(skeleton: Skeleton, nodes: Iterable[int | None]) -> Bools:
+    """Return the mask (N,) of some nodes; None is left out."""
+    found = np.zeros(len(skeleton), np.bool_)
+    found[[node for node in nodes if node is not None]] = True
+    return found
+
+
+def _colliders_by_owner(description: PhysicsDescription, skeleton: Skeleton) -> dict[int, list[int]]:
+    """Nodes with a collider by the nearest node with a motion, from their own upwards; −1 for none."""
+    moved = node_mask(skeleton, description.motions)
+    nearest = nearest_ancestors(skeleton.parents, moved)
+    found: dict[int, list[int]] = {}
+    for node in description.colliders:
+        found.setdefault(node if moved[node] else int(nearest[node]), []).append(node)
+    return found
 
 
 def find_owner(skeleton: Skeleton, node: int, description: PhysicsDescription) -> int:
@@ -77,11 +97,6 @@ def relative_frame(outer: Frame, inner: Frame) -> Frame:
     return Frame(quaternion.rotate(back, inner.position - outer.position), quaternion.multiply(back, inner.rotation))
 
 
-def _frame(world: Floats) -> Frame:
-    position, rotation, _, _ = matrix.decompose(world)
-    return Frame(position, rotation)
-
-
 def _body(
     node: int,
     kind: BodyKind,
@@ -89,13 +104,13 @@ def _body(
     colliders: Sequence[int],
     description: PhysicsDescription,
     skeleton: Skeleton,
-    frame: Frame,
+    frames: Sequence[Frame],
     world: Floats,
 ) -> RigidBody:
-    made = []
+    made, frame = [], frames[node]
     for each in colliders:
         try:
-            made += _collider(each, description.colliders[each], frame, world[each])
+            made += _collider(each, description.colliders[each], frame, frames[each], world[each])
         except AnimError as error:
             raise error.at(skeleton.label(each)) from None
     reach = [float(np.linalg.norm(each.frame.position)) + bounding_radius(each.shape) for each in made]
@@ -105,9 +120,8 @@ def _body(
     return RigidBody(node, kind, frame, tuple(made), motion, velocity, spin, max(reach, default=0.0))
 
 
-def _collider(node: int, collider: Collider, body: Frame, world: Floats) -> list[BodyCollider]:
+def _collider(node: int, collider: Collider, body: Frame, own: Frame, world: Floats) -> list[BodyCollider]:
     """One collider in its body's frame; none for a scale of 0, which disables it."""
-    own = _frame(world)
     linear = quaternion.to_matrix(quaternion.conjugate(own.rotation)) @ world[:, :3]
     if not np.linalg.norm(linear, axis=0).any():
         return []

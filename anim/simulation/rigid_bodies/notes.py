@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from anim.maths import hierarchy
 from anim.model import Clip, Interpolation, Skeleton
 from anim.sampling.sample import sample
-from anim.simulation.rigid_bodies.assembly import ancestors
+from anim.simulation.rigid_bodies.assembly import ancestors, node_mask
 from anim.simulation.rigid_bodies.extents import body_extent, smallest_radius
 from anim.simulation.rigid_bodies.loop import BLEND_S
 from anim.simulation.rigid_bodies.motion import RigidMotion
@@ -78,8 +79,9 @@ def _far(rigid: RigidScene, motion: RigidMotion) -> list[str]:
 
 
 def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
-    tracked = {track.node for track in clip.tracks}
-    below = [i for i in rigid.moving if tracked & set(ancestors(skeleton, rigid.bodies[i].node)[1:])]
+    tracked = node_mask(skeleton, (track.node for track in clip.tracks))
+    is_moved = np.append(hierarchy.with_descendants(skeleton.parents, tracked), False)  # the last: above a root
+    below = [i for i in rigid.moving if is_moved[skeleton.parents[rigid.bodies[i].node]]]
     if not below:
         return []
     label = skeleton.label(rigid.bodies[below[0]].node)
@@ -88,11 +90,12 @@ def _animated_parents(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list
 
 def _jumps(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
     """Animated bodies that STEP keys move at once: within one step, so with any velocity."""
-    found = []
-    for i in rigid.animated:
+    found: list[str] = []
+    stepped = [track for track in clip.tracks if track.interpolation is Interpolation.STEP]
+    for i in rigid.animated if stepped else ():
         body = rigid.bodies[i]
         above = set(ancestors(skeleton, body.node))
-        steps = [t.times for t in clip.tracks if t.interpolation is Interpolation.STEP and t.node in above]
+        steps = [track.times for track in stepped if track.node in above]
         if not steps:
             continue
         at = np.unique(np.concatenate(steps))[1:]

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Bools, Floats
+from anim.arrays import Bools, Floats, Ints
 from anim.errors import AnimError, FormatError, NotFoundError, UnsupportedError
-from anim.maths import matrix
+from anim.maths import hierarchy, matrix
 from anim.model import Skeleton
 from anim.sampling import rest_world
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
@@ -25,12 +25,13 @@ def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
     UnsupportedError for a joint that `check_rotatable` refuses.
     """
     owners: dict[int, int] = {}
+    subtrees = hierarchy.find_subtrees(skeleton.parents)
     for i, collider in enumerate(bones.colliders):
         if collider.node is not None:
             _check_node(skeleton, collider.node, f"collider {i}")
     for i, chain in enumerate(bones.chains):
         try:
-            _check_chain(skeleton, bones, chain)
+            _check_chain(skeleton, subtrees, bones, chain)
         except AnimError as error:
             raise error.at(chain_label(bones.chains, i)) from None
         for joint in chain.joints:
@@ -41,19 +42,24 @@ def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
                 )
 
 
-def _check_chain(skeleton: Skeleton, bones: SpringBones, chain: SpringChain) -> None:
+def _is_within(subtrees: tuple[Ints, Ints], node: int, other: int) -> bool:
+    """True for a node that is another one or below it. subtrees: as of `find_subtrees`."""
+    first, end = subtrees
+    return bool(first[other] <= first[node] < end[other])
+
+
+def _check_chain(skeleton: Skeleton, subtrees: tuple[Ints, Ints], bones: SpringBones, chain: SpringChain) -> None:
     seen: set[int] = set()
     for joint in chain.joints:
-        _check_joint(skeleton, joint)
+        _check_joint(skeleton, subtrees, joint)
         if joint.node in seen:
             raise FormatError(f"{skeleton.label(joint.node)} is a joint twice (expected once)")
         seen.add(joint.node)
-        below = skeleton.descendants(joint.node)
         for index in chain.colliders:
-            _check_collider(skeleton, bones, index, joint, below)
+            _check_collider(skeleton, subtrees, bones, index, joint)
     if chain.center is not None and chain.joints:
         _check_node(skeleton, chain.center, "center")
-        if not skeleton.descendants(chain.center)[chain.joints[0].node]:
+        if not _is_within(subtrees, chain.joints[0].node, chain.center):
             raise FormatError(
                 f"center is {skeleton.label(chain.center)} (expected {skeleton.label(chain.joints[0].node)} or one of "
                 "its ancestors)"
@@ -68,23 +74,25 @@ def check_rotatable(skeleton: Skeleton, node: int) -> None:
         )
 
 
-def _check_joint(skeleton: Skeleton, joint: SpringJoint) -> None:
+def _check_joint(skeleton: Skeleton, subtrees: tuple[Ints, Ints], joint: SpringJoint) -> None:
     _check_node(skeleton, joint.node, "joint")
     check_rotatable(skeleton, joint.node)
     if joint.tail is None:
         return
     _check_node(skeleton, joint.tail, "joint")
-    if joint.tail == joint.node or not skeleton.descendants(joint.node)[joint.tail]:
+    if joint.tail == joint.node or not _is_within(subtrees, joint.tail, joint.node):
         raise FormatError(
             f"{skeleton.label(joint.tail)} follows {skeleton.label(joint.node)} (expected one of its descendants)"
         )
 
 
-def _check_collider(skeleton: Skeleton, bones: SpringBones, index: int, joint: SpringJoint, below: Bools) -> None:
+def _check_collider(
+    skeleton: Skeleton, subtrees: tuple[Ints, Ints], bones: SpringBones, index: int, joint: SpringJoint
+) -> None:
     if not 0 <= index < len(bones.colliders):
         raise FormatError(f"there is no collider {index} (there are {len(bones.colliders)}, from 0 on)")
     collider = bones.colliders[index]
-    if collider.node is not None and below[collider.node]:
+    if collider.node is not None and _is_within(subtrees, collider.node, joint.node):
         raise FormatError(
             f"{skeleton.label(joint.node)} collides with collider {index}, which it moves itself: the collider is on "
             f"{skeleton.label(collider.node)}",

@@ -61,8 +61,10 @@ def make_plan(skeleton: Skeleton, bones: SpringBones) -> Plan:
     driven = np.array([n for n in needed if not moving[n]], np.int64)
     levels = []
     order = list(driven)
-    for number in range(1, max(depth.values(), default=0) + 1):
-        nodes = [node for node, each in depth.items() if each == number]
+    by_depth: dict[int, list[int]] = {}
+    for node in sorted(depth):
+        by_depth.setdefault(depth[node], []).append(node)
+    for nodes in (by_depth[number] for number in sorted(by_depth)):
         followers = tuple(node for node in nodes if node not in joints)
         batches = _batches(joints[node] for node in nodes if node in joints)
         levels.append(Level(batches, followers))
@@ -95,13 +97,21 @@ def _depths(
 ) -> dict[int, int]:
     """The level of each moving node, from 1 on: 1 more than the deepest of its dependencies."""
     waiting = {node: _dependencies(skeleton, bones, node, joints.get(node)) & moving for node in sorted(moving)}
-    depth: dict[int, int] = {}
-    while waiting:
-        ready = [node for node, needs in waiting.items() if needs <= depth.keys()]
-        if not ready:
-            raise _circle(skeleton, bones, next(joints[node] for node in waiting if node in joints))
-        for node in ready:
-            depth[node] = 1 + max((depth[each] for each in waiting.pop(node)), default=0)
+    followers: dict[int, list[int]] = {}
+    for node, needs in waiting.items():
+        for each in needs:
+            followers.setdefault(each, []).append(node)
+    missing = {node: len(needs) for node, needs in waiting.items()}
+    ready = [node for node, count in missing.items() if not count]
+    depth = dict.fromkeys(ready, 1)
+    for node in ready:  # which grows: nodes follow when the last of what they need is there
+        for each in followers.get(node, ()):
+            depth[each] = max(depth.get(each, 0), depth[node] + 1)
+            missing[each] -= 1
+            if not missing[each]:
+                ready.append(each)
+    if len(ready) < len(waiting):
+        raise _circle(skeleton, bones, next(joints[node] for node in waiting if missing[node] and node in joints))
     return depth
 
 
