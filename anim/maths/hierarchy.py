@@ -52,6 +52,24 @@ def find_subtrees(parents: Ints) -> tuple[Ints, Ints]:
     return first, first + np.array(_sum_up(order, parents, [1] * len(order)), np.int64)
 
 
+def is_below(subtrees: tuple[Ints, Ints], node: int, other: int) -> bool:
+    """Return whether a node is below another one. subtrees: as of `find_subtrees`."""
+    first, end = subtrees
+    return bool(first[other] < first[node] < end[other])
+
+
+def find_depths(parents: Ints) -> Ints:
+    """Return the number (N,) of nodes above each node. parents: (N,), −1 for roots.
+
+    In steps as of `with_descendants`.
+    """
+    found, above = (parents >= 0).astype(np.int64), parents.copy()
+    while len(some := np.flatnonzero(above >= 0)):
+        found[some] += found[above[some]]
+        above[some] = above[above[some]]
+    return found
+
+
 def subtree_sums(parents: Ints, values: Floats) -> Floats:
     """Return the sum (N,) of each node's value and those of all nodes below it. parents: (N,), −1 for roots."""
     return np.array(_sum_up(_depth_first(parents), parents, values.tolist()), np.float64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -104,9 +104,11 @@ def ancestors(parents: Sequence[int] | Ints, node: int) -> Iterator[int]:
         yield node
 
 
-def nearest_ancestor(parents: Sequence[int] | Ints, node: int, among: Container[int]) -> int:
-    """Return the nearest node above a node that is in `among`, −1 for none."""
-    return next((above for above in ancestors(parents, node) if above in among), -1)
+def node_mask(skeleton: Skeleton, nodes: Iterable[int | None]) -> Bools:
+    """Return the mask (N,) of some nodes; None is left out."""
+    found = np.zeros(len(skeleton), np.bool_)
+    found[[node for node in nodes if node is not None]] = True
+    return found
 
 
 def nearest_ancestors(parents: Ints, chosen: Bools) -> Ints:

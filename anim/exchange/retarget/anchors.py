@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias
 
+from anim.maths import hierarchy
 from anim.model import Skeleton
-from anim.model.skeleton import ancestors
+from anim.model.skeleton import ancestors, nearest_ancestors, node_mask
 
 Pair: TypeAlias = tuple[int, int]  # a source node and a target node
 NONE: Pair = (-1, -1)
@@ -19,12 +20,19 @@ def find_anchors(source: Skeleton, target: Skeleton, pairs: Mapping[int, int]) -
     from the root, is positioned relative to the lower leg if that is its parent in the other skeleton.
     """
     back = {b: a for a, b in pairs.items()}
+    above_source, above_target = (
+        nearest_ancestors(each.parents, node_mask(each, matched)) for each, matched in ((source, pairs), (target, back))
+    )
+    subtrees = hierarchy.find_subtrees(target.parents)
     found: dict[int, Pair] = {}
     for a, b in pairs.items():
-        in_source = next(((up, pairs[up]) for up in ancestors(source.parents, a) if up in pairs), NONE)
-        in_target = next(((back[up], up) for up in ancestors(target.parents, b) if up in back), NONE)
-        is_nearer = in_target == NONE or in_source[1] not in ancestors(target.parents, in_target[1])
-        depends = in_source[1] == b or b in ancestors(target.parents, in_source[1])
+        up = int(above_source[a])
+        in_source = (up, pairs[up]) if up >= 0 else NONE
+        up = int(above_target[b])
+        in_target = (back[up], up) if up >= 0 else NONE
+        both = NONE not in (in_source, in_target)
+        is_nearer = not (both and hierarchy.is_below(subtrees, in_target[1], in_source[1]))
+        depends = in_source[1] == b or (in_source != NONE and hierarchy.is_below(subtrees, in_source[1], b))
         found[b] = in_source if in_source != NONE and is_nearer and not depends else in_target
     return found
 

@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.maths import matrix
+from anim.maths import hierarchy, matrix
 from anim.model import MeshInstance, Scene, Skeleton
-from anim.model.skeleton import nearest_ancestor
+from anim.model.skeleton import node_mask
 from anim.sampling import rest_world
 
 SOLE_PERCENTILE = 5.0  # percentile of a foot's lowest height, taken as its ground
@@ -76,9 +76,7 @@ def find_soles(scene: Scene, positions: Floats, roles: Sequence[tuple[str, int]]
 
 def with_descendants(skeleton: Skeleton, nodes: Collection[int]) -> Ints:
     """Return the indices of `nodes` and of all their descendants, in order."""
-    parents = skeleton.parents
-    found = (n for n in range(len(skeleton)) if n in nodes or nearest_ancestor(parents, n, nodes) >= 0)
-    return np.array([*found], np.int64)
+    return np.flatnonzero(hierarchy.with_descendants(skeleton.parents, node_mask(skeleton, nodes)))
 
 
 def ground_offset(

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, Ints
 from anim.errors import RangeError
 from anim.exchange.retarget.anchors import NONE, Pair, evaluation_order, find_anchors
 from anim.exchange.retarget.joint_matching import JointMatch, match_same_hierarchy
 from anim.exchange.retarget.rest_alignment import RestAlignment, align_rests, floor_offset
 from anim.exchange.retarget.rest_pose import UP, RestPose, rest_corrections
-from anim.maths import matrix, quaternion
+from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Pose, Skeleton
 from anim.model.skeleton import ancestors
 from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
@@ -45,7 +46,7 @@ class PoseTransfer:
     corrections: by target node, the world rotation (4,) from its rest pose to the source's. anchors: the anchor
     pair of each matched target node. order: the target's nodes in evaluation order. top: the target's topmost joint
     of a person, or of all. lifted: nodes that move vertically with it, independent of their anchors. origin: (N, 3)
-    of the source, reference of paths.
+    of the source, reference of paths. subtrees: of the source, as of `find_subtrees`.
     """
 
     source: Skeleton
@@ -61,6 +62,7 @@ class PoseTransfer:
     top: int
     lifted: frozenset[int]
     origin: Floats
+    subtrees: tuple[Ints, Ints]
 
     def at(self, times: Floats, lowered: Floats | None = None) -> TargetMotion:
         """Return the target's motion at times (F,) in seconds, lowered by `lowered` (F,) metres."""
@@ -135,11 +137,10 @@ class PoseTransfer:
 
         Rotations of unmatched nodes between the two are ignored: the target has no joint there.
         """
-        between = [*ancestors(self.source.parents, a)]
-        if anchor not in between:
+        if not hierarchy.is_below(self.subtrees, a, anchor):
             return np.asarray(source_world[a, :, :, 3] - source_world[anchor, :, :, 3])
         inside = motion.translation[:, a]
-        for node in between[: between.index(anchor)]:
+        for node in itertools.takewhile(lambda each: each != anchor, ancestors(self.source.parents, a)):
             inside = motion.translation[:, node] + inside @ self.source_rest.local[node].T
         return np.asarray((source_world[anchor, :, :, :3] @ inside[..., None])[..., 0])
 
@@ -182,6 +183,7 @@ def build_transfer(
         top=top,
         lifted=_lifted_nodes(chosen, top),
         origin=_origin(source, clip, target_rest, source_top),
+        subtrees=hierarchy.find_subtrees(source.parents),
     )
 
 

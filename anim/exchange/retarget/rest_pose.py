@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,8 @@ from anim.arrays import Floats
 from anim.exchange.euler.motion import IDENTITY
 from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.joint_roles import PERSON
-from anim.maths import quaternion
-from anim.model.skeleton import ancestors, nearest_ancestor
+from anim.maths import hierarchy, quaternion
+from anim.model.skeleton import nearest_ancestors
 
 UP = np.array((0.0, 1.0, 0.0))
 SNAP_ANGLE_RAD = np.radians(30)  # angles nearer to a multiple of 90° are snapped: rest poses are made along axes
@@ -68,16 +68,17 @@ def rest_corrections(source: RestPose, target: RestPose, matching: JointMatch, t
     person = all(role in matching.source_roles for role in PERSON)
     ends = _limb_ends(matching) if person else _chain_ends(source, target, matching)
     found: dict[int, Floats] = {}
+    up_rotation = _up_rotation(matching) if person else set()
+    nearest = _nearest_above(target, set(matching.pairs.values()))
     for node in _parents_first(target, matching.pairs.values()):
         if node in ends:
             (a, b), end = ends[node]
             goal = quaternion.rotate(turn, source.positions[b] - source.positions[a])
             found[node] = rotation_between(target.positions[end] - target.positions[node], goal)
-        elif person and node in _up_rotation(matching):
+        elif node in up_rotation:
             found[node] = IDENTITY
         else:
-            above = nearest_ancestor(target.parents, node, found)
-            found[node] = found[above] if above >= 0 else IDENTITY
+            found[node] = found[nearest[node]] if nearest[node] >= 0 else IDENTITY
     return found
 
 
@@ -126,10 +127,20 @@ def _chain_ends(source: RestPose, target: RestPose, matching: JointMatch) -> Lim
 
 def _matched_child(pose: RestPose, nodes: set[int]) -> dict[int, list[int]]:
     below: dict[int, list[int]] = {}
+    nearest = _nearest_above(pose, nodes)
     for node in sorted(nodes):
-        below.setdefault(nearest_ancestor(pose.parents, node, nodes), []).append(node)
+        below.setdefault(nearest[node], []).append(node)
     return below
 
 
+def _nearest_above(pose: RestPose, nodes: Set[int]) -> list[int]:
+    """For every node (N,) the nearest one above it among some, −1 for none."""
+    chosen = np.zeros(len(pose.parents), np.bool_)
+    chosen[list(nodes)] = True
+    found: list[int] = nearest_ancestors(np.array(pose.parents, np.int64), chosen).tolist()
+    return found
+
+
 def _parents_first(pose: RestPose, nodes: Iterable[int]) -> list[int]:
-    return sorted(nodes, key=lambda node: sum(1 for _ in ancestors(pose.parents, node)))
+    depths = hierarchy.find_depths(np.array(pose.parents, np.int64)).tolist()
+    return sorted(nodes, key=lambda node: int(depths[node]))

@@ -9,9 +9,9 @@ import numpy as np
 from anim.arrays import Floats
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
-from anim.maths import matrix, quaternion
+from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
-from anim.model.skeleton import ancestors, nearest_ancestor
+from anim.model.skeleton import nearest_ancestors, node_mask
 from anim.sampling import sample_pose
 from anim.sampling.times import key_times
 from anim.sampling.world import world_by_node
@@ -35,10 +35,10 @@ def scaled_ancestors(done: CharacterClip, stay: Sequence[Track], skeleton: Skele
 
     `add_retained_tracks` removes their effect from the joints: a motion such as BVH has no scale.
     """
-    known = set(done.matching.pairs.values())
-    above = {up for node in known for up in _between(skeleton, node, known)}
+    known = node_mask(skeleton, done.matching.pairs.values())
+    above = hierarchy.with_ancestors(skeleton.parents, known) & ~known
     scales = [(track.node, track.values) for track in stay if track.node is not None and track.path == "scale"]
-    return sorted({n for n, v in scales if n in above and not np.allclose(v, skeleton.scale[n], rtol=SAME_SCALE)})
+    return sorted({n for n, v in scales if above[n] and not np.allclose(v, skeleton.scale[n], rtol=SAME_SCALE)})
 
 
 def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Skeleton) -> Clip:
@@ -48,7 +48,9 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
     """
     moving = {track.node for track in stay if track.path != "weights"}
     known = set(done.matching.pairs.values())
-    below = [node for node in known if moving & set(_between(skeleton, node, known))]
+    is_known, is_moving = node_mask(skeleton, known), node_mask(skeleton, moving)
+    nearest = nearest_ancestors(skeleton.parents, is_known | is_moving)
+    below = [node for node in known if nearest[node] >= 0 and not is_known[nearest[node]]]
     if not below:
         return Clip(done.clip.name, (*done.clip.tracks, *stay))
     times = key_times(np.concatenate([track.times for track in done.clip.tracks]))
@@ -56,22 +58,15 @@ def add_retained_tracks(done: CharacterClip, stay: Sequence[Track], skeleton: Sk
     world = world_by_node(skeleton, sample_pose(skeleton, Clip("", (*stay, *done.clip.tracks)), times))
     tracks = {(track.node, track.path): track for track in done.clip.tracks}
     axis = TimeAxis(times)
+    tops = nearest_ancestors(skeleton.parents, is_known)
     for node in below:
-        parent = int(skeleton.parents[node])
-        top = nearest_ancestor(skeleton.parents, node, known)
+        parent, top = int(skeleton.parents[node]), int(tops[node])
         carried = world[parent]
         if top >= 0:  # world matrix of the parent after its matched joint is restored
             carried = matrix.multiply(matrix.multiply(wanted[top], matrix.inverse(world[top])), carried)
         local = matrix.multiply(matrix.inverse(carried), wanted[node])
         tracks |= {(node, track.path): track for track in _tracks(node, axis, local)}
     return Clip(done.clip.name, (*tracks.values(), *stay))
-
-
-def _between(skeleton: Skeleton, node: int, known: set[int]) -> Iterator[int]:
-    for up in ancestors(skeleton.parents, node):
-        if up in known:
-            return
-        yield up
 
 
 def _tracks(node: int, axis: TimeAxis, local: Floats) -> Iterator[Track]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from anim.arrays import Bools, Floats
+from anim.arrays import Floats
 from anim.errors import AnimError, FormatError, RangeError
 from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Skeleton
-from anim.model.skeleton import nearest_ancestors
+from anim.model.skeleton import nearest_ancestors, node_mask
 from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription, Shape, Vector
 from anim.simulation.rigid_bodies.rigid_scene import (
     WORLD,
@@ -58,13 +58,6 @@ def assemble(
     if description.floor is not None:
         bodies.append(_floor(description))
     return RigidScene(tuple(bodies), joints, gravity)
-
-
-def node_mask(skeleton: Skeleton, nodes: Iterable[int | None]) -> Bools:
-    """Return the mask (N,) of some nodes; None is left out."""
-    found = np.zeros(len(skeleton), np.bool_)
-    found[[node for node in nodes if node is not None]] = True
-    return found
 
 
 def _colliders_by_owner(description: PhysicsDescription, skeleton: Skeleton) -> dict[int, list[int]]:

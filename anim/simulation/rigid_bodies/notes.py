@@ -6,8 +6,9 @@ import numpy as np
 
 from anim.maths import hierarchy
 from anim.model import Clip, Interpolation, Skeleton
+from anim.model.skeleton import node_mask
 from anim.sampling.sample import sample
-from anim.simulation.rigid_bodies.assembly import ancestors, node_mask
+from anim.simulation.rigid_bodies.assembly import ancestors
 from anim.simulation.rigid_bodies.extents import body_extent, smallest_radius
 from anim.simulation.rigid_bodies.loop import BLEND_S
 from anim.simulation.rigid_bodies.motion import RigidMotion

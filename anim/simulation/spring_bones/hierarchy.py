@@ -42,12 +42,6 @@ def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
                 )
 
 
-def _is_within(subtrees: tuple[Ints, Ints], node: int, other: int) -> bool:
-    """True for a node that is another one or below it. subtrees: as of `find_subtrees`."""
-    first, end = subtrees
-    return bool(first[other] <= first[node] < end[other])
-
-
 def _check_chain(skeleton: Skeleton, subtrees: tuple[Ints, Ints], bones: SpringBones, chain: SpringChain) -> None:
     seen: set[int] = set()
     for joint in chain.joints:
@@ -59,10 +53,10 @@ def _check_chain(skeleton: Skeleton, subtrees: tuple[Ints, Ints], bones: SpringB
             _check_collider(skeleton, subtrees, bones, index, joint)
     if chain.center is not None and chain.joints:
         _check_node(skeleton, chain.center, "center")
-        if not _is_within(subtrees, chain.joints[0].node, chain.center):
+        first = chain.joints[0].node
+        if first != chain.center and not hierarchy.is_below(subtrees, first, chain.center):
             raise FormatError(
-                f"center is {skeleton.label(chain.center)} (expected {skeleton.label(chain.joints[0].node)} or one of "
-                "its ancestors)"
+                f"center is {skeleton.label(chain.center)} (expected {skeleton.label(first)} or one of its ancestors)"
             )
 
 
@@ -80,7 +74,7 @@ def _check_joint(skeleton: Skeleton, subtrees: tuple[Ints, Ints], joint: SpringJ
     if joint.tail is None:
         return
     _check_node(skeleton, joint.tail, "joint")
-    if joint.tail == joint.node or not _is_within(subtrees, joint.tail, joint.node):
+    if not hierarchy.is_below(subtrees, joint.tail, joint.node):
         raise FormatError(
             f"{skeleton.label(joint.tail)} follows {skeleton.label(joint.node)} (expected one of its descendants)"
         )
@@ -92,7 +86,8 @@ def _check_collider(
     if not 0 <= index < len(bones.colliders):
         raise FormatError(f"there is no collider {index} (there are {len(bones.colliders)}, from 0 on)")
     collider = bones.colliders[index]
-    if collider.node is not None and _is_within(subtrees, collider.node, joint.node):
+    moved = collider.node is not None and hierarchy.is_below(subtrees, collider.node, joint.node)
+    if collider.node is not None and (moved or collider.node == joint.node):
         raise FormatError(
             f"{skeleton.label(joint.node)} collides with collider {index}, which it moves itself: the collider is on "
             f"{skeleton.label(collider.node)}",

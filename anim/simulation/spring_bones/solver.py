@@ -10,7 +10,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import UnstableError
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
-from anim.model.skeleton import nearest_ancestors
+from anim.model.skeleton import nearest_ancestors, node_mask
 from anim.simulation.spring_bones.batch import Batch
 from anim.simulation.spring_bones.chains import SpringBones
 from anim.simulation.spring_bones.driver import Driver, DriverChunk
@@ -151,9 +151,7 @@ class _LevelSolver:
 
 def _base_rows(skeleton: Skeleton, bones: SpringBones, plan: Plan) -> Ints:
     """The row (J,) of each joint's nearest ancestor that no spring moves; −1, the scene, if there is none."""
-    driven = np.zeros(len(skeleton), np.bool_)
-    driven[plan.driven] = True
-    bases = nearest_ancestors(skeleton.parents, driven)[list(bones.nodes)]
+    bases = nearest_ancestors(skeleton.parents, node_mask(skeleton, plan.driven))[list(bones.nodes)]
     return np.where(bases >= 0, plan.rows[bases], -1)
 
 
