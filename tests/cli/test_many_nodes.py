@@ -44,6 +44,25 @@ def test_work_grows_with_the_count(make: many.Make, count: int, command: str, ca
     assert taken[1] < LIMIT * taken[0]
 
 
+def test_work_on_a_chain_of_springs_grows_with_its_length(call: Call, tmp_path: Path) -> None:
+    taken = []
+    for number in (200, 600):
+        (tmp_path / "in.glb").write_bytes(many.spring_line(number))
+        options = ("--duration", "0.02", "--fps", "60")
+        taken.append(work(call, "simulate", "springs", tmp_path / "in.glb", tmp_path / "out.glb", *options))
+    assert taken[1] < LIMIT * taken[0]
+
+
+def test_work_on_a_character_grows_with_its_depth(call: Call, tmp_path: Path) -> None:
+    taken = []
+    for number in (200, 600):
+        (tmp_path / "in.json").write_bytes(many.json_curves(number))
+        (tmp_path / "onto.glb").write_bytes(many.chain(number))
+        options = ("--onto", tmp_path / "onto.glb")
+        taken.append(work(call, "from-euler", tmp_path / "in.json", tmp_path / "out.glb", *options))
+    assert taken[1] < LIMIT * taken[0]
+
+
 @pytest.mark.parametrize(("make", "count", "line", "limit"), CALLS_PER_ITEM, ids=lambda each: str(each).split()[0])
 def test_a_node_or_clip_takes_few_calls(
     make: many.Make, count: int, line: str, limit: int, call: Call, tmp_path: Path
