@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from anim.arrays import Ints
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
-from anim.model import Scene
-from anim.simulation.rigid_bodies.assembly import ancestors
+from anim.maths import hierarchy
+from anim.model import MeshInstance, Scene
+from anim.model.skeleton import nearest_ancestors, node_mask
 from anim.simulation.rigid_bodies.description import Collider, Material, Motion, PhysicsDescription, Shape
 from anim.simulation.rigid_bodies.shapes import mesh_shape
 
@@ -33,14 +37,16 @@ def add_chosen(description: PhysicsDescription, scene: Scene, chosen: ChosenNode
     """
     motions = {**dict.fromkeys(chosen.bodies, chosen.motion), **description.motions}
     colliders = dict(description.colliders)
+    meshes = _MeshNodes(scene, motions)
+    instances = {each.node: each for each in reversed(scene.instances)}
     for nodes, kind in ((chosen.bodies, chosen.shape), (chosen.colliders, "mesh")):
         for node in nodes:
-            below = _mesh_nodes(scene, node, motions)
-            if not below and not any(node in ancestors(scene.skeleton, each) for each in colliders):
+            below = meshes.of(node)
+            if not below and not meshes.has_any_below(node, colliders):
                 raise NotFoundError(f"{scene.skeleton.label(node)} has no mesh to collide with")
             for each in below:
                 if each not in colliders:
-                    colliders[each] = Collider(_shape(scene, each, kind), chosen.material)
+                    colliders[each] = Collider(_shape(scene, instances[each], kind), chosen.material)
     return replace(description, motions=motions, colliders=colliders)
 
 
@@ -49,26 +55,45 @@ def split_by_mesh(scene: Scene, nodes: tuple[int, ...]) -> tuple[tuple[int, ...]
 
     A pattern also matches joints, cameras, and groups whose meshes are bodies themselves.
     """
-    found = [bool(_mesh_nodes(scene, node, nodes)) for node in nodes]
+    meshes = _MeshNodes(scene, nodes)
+    found = [bool(meshes.of(node)) for node in nodes]
     if not any(found):
         return nodes, ()
     with_mesh = tuple(node for node, has in zip(nodes, found, strict=True) if has)
     return with_mesh, tuple(node for node, has in zip(nodes, found, strict=True) if not has)
 
 
-def _mesh_nodes(scene: Scene, top: int, motions: Collection[int]) -> list[int]:
-    """Nodes with a mesh at or below `top`, without those of another body below it."""
-    found = []
-    for instance in scene.instances:
-        chain = ancestors(scene.skeleton, instance.node)
-        if top in chain and not set(chain[: chain.index(top)]) & set(motions):
-            found.append(instance.node)
-    return found
+class _MeshNodes:
+    """The nodes with meshes, by the node that they move with. motions: nodes that are bodies."""
+
+    def __init__(self, scene: Scene, motions: Iterable[int]) -> None:
+        parents = scene.skeleton.parents
+        moved = node_mask(scene.skeleton, motions)
+        self._first, self._end = hierarchy.find_subtrees(parents)
+        self._body = np.where(moved, np.arange(len(parents)), nearest_ancestors(parents, moved))  # −1 for none
+        self._nodes: dict[int, list[int]] = {}  # by body
+        for instance in scene.instances:
+            self._nodes.setdefault(int(self._body[instance.node]), []).append(instance.node)
+        self._places = {body: np.sort(self._first[nodes]) for body, nodes in self._nodes.items()}
+
+    def of(self, top: int) -> list[int]:
+        """Return the nodes with a mesh at or below `top`, without those of another body below it."""
+        body = int(self._body[top])
+        if body not in self._nodes or not self._has_inside(self._places[body], top):
+            return []
+        return [node for node in self._nodes[body] if self._first[top] <= self._first[node] < self._end[top]]
+
+    def has_any_below(self, top: int, nodes: Iterable[int]) -> bool:
+        """Return whether any of some nodes is `top` or below it."""
+        return self._has_inside(np.sort(self._first[list(nodes)]), top)
+
+    def _has_inside(self, places: Ints, top: int) -> bool:
+        at = int(np.searchsorted(places, self._first[top]))
+        return at < len(places) and bool(places[at] < self._end[top])
 
 
-def _shape(scene: Scene, node: int, kind: str) -> Shape:
-    instance = next(each for each in scene.instances if each.node == node)
-    label = scene.skeleton.label(node)
+def _shape(scene: Scene, instance: MeshInstance, kind: str) -> Shape:
+    label = scene.skeleton.label(instance.node)
     if instance.skin is not None:
         raise UnsupportedError(f"{label} is skinned: a rigid body moves by its node alone")
     try:
