@@ -133,8 +133,16 @@ def rotate(q: Floats, vectors: Floats) -> Floats:
     rotate([0, 0, √½, √½], [1, 0, 0]) → [0, 1, 0]
     """
     axis, w = q[..., :3], q[..., 3:]
-    side = 2 * np.cross(axis, vectors)
-    return np.asarray(vectors + w * side + np.cross(axis, side))
+    side = 2 * _cross(axis, np.asarray(vectors))
+    return np.asarray(vectors + w * side + _cross(axis, side))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Cross products (..., 3), component by component: np.cross takes twice the time for few and six times for many."""
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.subtract(a[..., j] * b[..., k], a[..., k] * b[..., j], out=found[..., i])
+    return found
 
 
 def to_matrix(q: Floats) -> Floats:
