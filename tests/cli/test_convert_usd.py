@@ -165,3 +165,13 @@ def test_a_deep_hierarchy_is_refused_before_usd_takes_minutes_for_it(call: Call,
         run = call("convert", path, out)
         assert run.code == expected
         assert expected == 0 or f"meshes hang on {count} levels of nodes" in run.err
+
+
+def test_joints_whose_paths_take_too_much_are_refused(call: Call, tmp_path: Path) -> None:
+    """In a line of joints they grow with the square of their number."""
+    path, out = tmp_path / "deep.glb", tmp_path / "out.usdc"
+    for count, expected in ((500, 0), (3000, 4)):
+        path.write_bytes(many.joints(count))
+        run = call("convert", path, out)
+        assert run.code == expected
+        assert expected == 0 or "the paths of 3000 joints take more than 10 MB in USD" in run.err

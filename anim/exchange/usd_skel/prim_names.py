@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from anim.arrays import Ints
+from anim.errors import UnsupportedError
+
+MAX_PATH_CHARACTERS = 10_000_000
 
 
 class PrimNames:
@@ -47,9 +50,18 @@ def valid(name: str) -> str:
 
 
 def joint_paths(names: Sequence[str], parents: Ints) -> list[str]:
-    """Return the paths of joints (J,), parents before children: joint_paths(["hip", "leg"], [-1, 0]) → hip, hip/leg."""
-    known, found = PrimNames(), list[str]()
+    """Return the paths of joints (J,), parents before children: joint_paths(["hip", "leg"], [-1, 0]) → hip, hip/leg.
+
+    Raises UnsupportedError where they are too long: each repeats the names of all joints above it.
+    """
+    known, found, length = PrimNames(), list[str](), 0
     for name, parent in zip(names, parents.tolist(), strict=True):
         path = known.child(found[parent] if parent >= 0 else "", name)
         found.append(path if parent >= 0 else path[1:])
+        length += len(path)
+        if length > MAX_PATH_CHARACTERS:
+            raise UnsupportedError(
+                f"the paths of {len(names)} joints take more than {MAX_PATH_CHARACTERS // 10**6} MB in USD: the joints "
+                "hang too deep, or their names are too long"
+            )
     return found
