@@ -122,6 +122,11 @@ def nearest_ancestors(parents: Ints, chosen: Bools) -> Ints:
     return found
 
 
+def nearest_at_or_above(parents: Ints, chosen: Bools) -> Ints:
+    """Return for every node (N,) itself if it is among those of a mask (N,), else the nearest one above it, or −1."""
+    return np.where(chosen, np.arange(len(parents)), nearest_ancestors(parents, chosen))
+
+
 def _find_levels(parents: Ints) -> tuple[Ints, ...]:
     """The nodes of each depth; raises FormatError for a cycle or a parent that does not exist.
 

@@ -63,15 +63,14 @@ def optimize(
 
     scene, clips: of the document. chosen: indices of the clips to optimize, all by default. workers: number of
     processes; the result is the same for any number. start: start method of `multiprocessing`. detailed: verifications
-    with statistics. verified: whether errors are measured; without, only sizes are of use. earlier: results of `search`
-    within bounds that are no larger, by index of the clip; these clips are not searched again. progress: called with
-    the fraction done.
+    with statistics. verified: whether errors are measured; without, only sizes are of use. earlier: results of
+    `find_results` within bounds that are no larger, by index of the clip; these clips are not searched again.
+    progress: called with the fraction done.
     A clip without a lossy solution within all bounds is stored losslessly. Output of the same request comes back
     unchanged.
     """
     chosen = range(len(clips)) if chosen is None else chosen
-    options = f"{request.name} {tuple(chosen)}"
-    if writing.has_mark(document, clips, options):
+    if is_output_of(document, clips, request, chosen):
         return Optimized(document, {}, {}, unchanged=True)
     _check_durations(clips, chosen)
     base, optimizer = _prepare(document, scene, clips, request, detailed=detailed, verified=verified)
@@ -83,11 +82,20 @@ def optimize(
     read_back = reader.clips(new)
     for number in changed_clips(read_back, solutions):
         (verdicts[number],) = optimizer.verify([VerificationRequest(number, read_back[number])])
-    done = writing.add_mark(new, read_back, options)
+    done = writing.add_mark(new, read_back, _options(request, chosen))
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
 
 
-def search(
+def is_output_of(document: Document, clips: Sequence[Clip], request: Request, chosen: Sequence[int]) -> bool:
+    """Return whether a document is the output of the same request; arguments as of `optimize`."""
+    return writing.has_mark(document, clips, _options(request, chosen))
+
+
+def _options(request: Request, chosen: Sequence[int]) -> str:
+    return f"{request.name} {tuple(chosen)}"
+
+
+def find_results(
     document: Document,
     scene: Scene,
     clips: Sequence[Clip],
@@ -106,7 +114,7 @@ def search(
     return _results(optimizer, chosen, {}, workers, start, progress)
 
 
-def sizes(results: Mapping[int, ClipResult], request: Request) -> dict[int, float]:
+def estimate_sizes(results: Mapping[int, ClipResult], request: Request) -> dict[int, float]:
     """Return the approximate number of bytes of each result of a request, by index of the clip."""
     coding = Encoding(request.packing, BYTE_COSTS[request.objective])
     return {number: each.solution.size(coding) for number, each in results.items()}

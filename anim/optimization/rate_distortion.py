@@ -56,8 +56,8 @@ def smallest_bound(
         return 0.0 if sized(0.0).size <= max_bytes else None
     table = _SizeTable(diagonal, sized)
     first = table.point(FIRST_ENTRY)
-    is_roomy = max_bytes - first.size >= (EXACT_SIZE_RATIO - 1) * first.animation
-    if is_roomy and sized(0.0).size <= max_bytes:
+    unused = max_bytes - first.size
+    if unused >= (EXACT_SIZE_RATIO - 1) * first.animation and sized(0.0).size <= max_bytes:
         return 0.0
     entry = _first_entry(
         lambda entry, larger: table.size(entry, ratio) <= max_bytes and table.is_plausible(entry, larger)
@@ -83,13 +83,16 @@ def local_exponent(bound: float, points: Sequence[RatePoint]) -> float:
 
 
 def bound_for(excess: float, bound: float, diagonal: float, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
-    """Return the bound, m, at which what takes `excess` times the bytes available at a bound is likely to fit."""
+    """Return the likely bound, m, of a result that fits, after one that takes `excess` times the bytes available."""
     factor = excess**exponent
     return _rounded(bound * min(max(factor, 1 / MAX_STEP_FACTOR), MAX_STEP_FACTOR), diagonal)
 
 
 def size_at(size: float, bound: float, other: float, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
-    """Return the bytes to expect at another bound above 0 of what takes `size` at a bound, as it does at 0."""
+    """Return the likely size, in bytes, at another bound above 0, of a result of `size` bytes at a bound.
+
+    It stays the same from a bound of 0.
+    """
     return float(size * (bound / other) ** (1 / exponent)) if bound else size
 
 
@@ -165,7 +168,7 @@ class _SizeTable:
         return float(self.bound(entry - 1) * (self.bound(entry) / self.bound(entry - 1)) ** fraction)
 
     def point(self, entry: int) -> RatePoint:
-        """Return what the quick search gives at an entry."""
+        """Return the size from the quick search at an entry."""
         if entry not in self._found:
             self._found[entry] = self._sized(self.bound(entry))
         return self._found[entry]

@@ -73,6 +73,7 @@ def verify_clips(
     for pair, each in zip(pairs, found, strict=True):
         more = statistics(ruler, *pair, times=times(*pair), player=players[0]) if wanted else None
         usage = _usage(ruler, pair, each.error, more, bounds)
+        more = more and more.capped(each.error.max_error)
         verified.append(Verification(each.error, each.player, more, usage, each.bound))
     return verified
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from anim.optimization.clip_optimizer import ClipResult
-from anim.optimization.optimize import Optimized, sizes
+from anim.optimization.optimize import Optimized, estimate_sizes, is_output_of
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import (
     MAX_BOUND_PER_DIAGONAL,
@@ -23,38 +23,44 @@ from anim.units import format_number, plural
 from cli.errors import CheckError
 from cli.reports import optimize_report
 from cli.text import format_length
-from cli.workflows.fast_sizes import FAST, MIN_SAMPLED, FastSizes
-from cli.workflows.optimize_job import OptimizeJob, with_bound
+from cli.workflows.fast_sizes import MIN_SAMPLED, FastSizes
+from cli.workflows.optimize_job import FAST, OptimizeJob, with_bound
 
 USUAL_RATIO = 0.955  # bytes of animation after a longer search, as a fraction of those after a fast one
-MAX_REPAIRS = 4  # searches of some clips at a larger bound, until a result fits; the last one at the largest
-MAX_UNUSED_FRACTION = 0.015  # of the animation's bytes; more are worth another search
-REPAIR_FRACTION = 0.005  # of the same, that a larger bound would save beyond what is needed: so fewer clips need it
-REPAIR_MARGIN = 1.25  # of the bytes too many: what a larger bound saves is an estimate
-SAMPLE_DOUBT = 0.025  # fraction by which the bytes of all clips differ from those that a sample lets expect
+SAMPLE_UNCERTAINTY = 0.025  # fraction by which the bytes of all clips differ from those expected after a sample
 MAX_RAISE_FACTOR = 1.25  # between bounds of groups of clips: where more is needed, some of those before are repaired
-MAX_REFINEMENTS = 3
+MAX_REPAIRS = 6  # searches of some clips at a larger bound, until a result fits; the last two are of all clips
+REPAIR_FRACTION = 0.005  # of the animation's bytes, that a larger bound would save beyond the need: few clips need it
+REPAIR_MARGIN = 1.25  # of the bytes too many: what a larger bound saves is an estimate
+MAX_UNUSED_FRACTION = 0.015  # of the animation's bytes; more are worth another search
+MAX_REFINEMENTS = 4
 
 
 @dataclass(frozen=True, slots=True)
 class _Clip:
-    """The result of a clip at a bound, m, with its bytes."""
+    """The smallest result of a clip: its bound, m, and bytes. tried: the largest bound that was searched, m."""
 
     result: ClipResult
     bound: float
     size: float
+    tried: float
 
 
 @dataclass(frozen=True, slots=True)
 class _Result:
-    """A result with its size and error."""
+    """A result with its size and error. tried: m, the largest bound at which all clips were searched."""
 
     optimized: Optimized
     point: RatePoint
+    tried: float
 
 
 class ByteLimit:
-    """A byte limit for the output of a job. request: with any bound. most: m, the largest one."""
+    """A byte limit for the output of a job.
+
+    request: its bound counts only as the ceiling. ceiling: m, the greatest allowed error; None for a tenth of the
+    diagonal.
+    """
 
     def __init__(self, job: OptimizeJob, max_bytes: int, request: Request, ceiling: float | None = None) -> None:
         self._job = job
@@ -62,145 +68,173 @@ class ByteLimit:
         self._request = request
         self._fast = FastSizes(job, request)
         self._most = MAX_BOUND_PER_DIAGONAL * job.scale if ceiling is None else ceiling
+        # In the place of the bound: output of the same limit comes back unchanged.
+        self._name = ("max_bytes", str(max_bytes), str(ceiling is None), *(request.given or (repr(request.bounds),)))
+        self._clips: dict[int, _Clip] = {}  # of those that differ
 
     def run(self) -> tuple[Request, Optimized]:
         """Return the request and the result with the smallest error that fits. Raises CheckError if nothing fits."""
+        job, named = self._job, replace(self._request, given=self._name)
+        if is_output_of(job.source.document, job.clips, named, job.chosen):
+            return named, Optimized(job.source.document, {}, {}, unchanged=True)
         ratio = 1.0 if self._request.effort == FAST else USUAL_RATIO
-        bound = smallest_bound(self._max_bytes, self._job.scale, self._fast.at, ratio=ratio)
-        found = self._fitting(self._most if bound is None else min(bound, self._most))
+        bound = smallest_bound(self._max_bytes, job.scale, self._fast.at, ratio=ratio)
+        found = self._find_fitting(self._most if bound is None else min(bound, self._most))
         best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
         if best is None:
-            fast = replace(self._request, effort=FAST)  # no longer search fits
-            optimized = self._job.run(with_bound(fast, self._most))
-            found.append(_Result(optimized, self._job.point(self._most, optimized)))
-            if not self._fits(found[-1]):
-                raise self._refusal([*(each.point for each in found), self._fast.at(0.0)])
-            best = found[-1]
+            raise self._refusal([*(each.point for each in found), self._fast.at(0.0)])
         return with_bound(self._request, best.point.max_error), best.optimized
 
-    def _fitting(self, bound: float) -> list[_Result]:
+    def _find_fitting(self, bound: float) -> list[_Result]:
         """Results of verified searches: at larger bounds until one fits, then at smaller ones while bytes are unused.
 
         Sizes jump in files of few keys, so that the first bound that fits can be far from the smallest.
         """
-        clips = self._searched(bound)
-        found = [self._written(clips)]
+        self._search_groups(bound)
+        found = [self._write()]
+        step = 1.0
         for repair in range(MAX_REPAIRS):
-            if self._fits(found[-1]) or found[-1].point.max_error >= self._most:
+            if self._fits(found[-1]) or found[-1].tried >= self._most:
                 break
             if repair == MAX_REPAIRS - 1:
-                self._search(clips, list(clips), self._most)
+                found += self._find_fast(bound)
+                if self._fits(found[-1]):
+                    break
+                self._search(list(self._clips), self._most)
+            elif repair == MAX_REPAIRS - 2:
+                self._search(list(self._clips), self._fast.fitting_bound(self._max_bytes, above=found[-1].tried))
             else:
-                self._repair(clips, found[-1].point, self._repair_bound(found[-1].point))
-            found.append(self._written(clips))
+                self._repair(found[-1].point, self._repair_bound(found[-1].point, step))
+                step *= 2
+            found.append(self._write())
         if not self._fits(found[-1]):
-            return found
+            return found + self._find_fast(self._most)
         best = found[-1].point
         for _ in range(MAX_REFINEMENTS):
             point = found[-1].point
+            failed = max((each.tried for each in found if not self._fits(each)), default=0.0)
             if self._fits(found[-1]):
                 best = point
-                failed = max((each.point.max_error for each in found if not self._fits(each)), default=0.0)
                 low = max(bound_below(best, self._max_bytes, self._fast.exponent(best.max_error)), failed)
                 between = bound_between(low, best.max_error, self._job.scale)
                 if between is None or self._max_bytes - best.size <= MAX_UNUSED_FRACTION * best.animation:
                     break
-                self._search(clips, [i for i, each in clips.items() if each.bound > between], between)
+                self._search([i for i, each in self._clips.items() if each.bound > between], between)
             else:
-                between = bound_between(point.max_error, best.max_error, self._job.scale)
+                between = bound_between(failed, best.max_error, self._job.scale)
                 if between is None:
                     break
-                self._repair(clips, point, min(self._repair_bound(point), between))
-            found.append(self._written(clips))
+                self._repair(point, min(self._repair_bound(point), between))
+            found.append(self._write())
         return found
 
-    def _searched(self, bound: float) -> dict[int, _Clip]:
-        """All clips after a full search, a sample first, each group at the bound that the bytes so far leave it.
+    def _find_fast(self, bound: float) -> list[_Result]:
+        """The result of a fast search, which by chance can take fewer bytes; none if it is not likely to fit."""
+        if self._request.effort == FAST or (bound < self._most and self._fast.at(bound).size > self._max_bytes):
+            return []
+        request = with_bound(replace(self._request, effort=FAST), bound)
+        results = self._job.search(request, self._fast.clips)
+        return [self._write_results(results, bound, bound)]
+
+    def _search_groups(self, bound: float) -> None:
+        """Search all clips, a sample first, each group at the bound that the bytes so far leave it.
 
         The bound never decreases but for the sample: the error of a file is that of its worst clip.
         """
-        clips: dict[int, _Clip] = {}
-        self._search(clips, self._fast.sample, bound)
-        rest = [i for i in self._job.chosen if i not in clips]
+        fast = self._fast
+        self._search(fast.sample, bound)
+        rest = [i for i in fast.clips if i not in self._clips]
         if not bound or not rest:  # without error, or of few clips
-            self._search(clips, rest, bound)
-            return clips
-        wanted = self._bound_of(clips, self._job.chosen, bound, doubt=SAMPLE_DOUBT)
+            self._search(rest, bound)
+            return
+        wanted = self._bound_of(fast.clips, bound, uncertainty=SAMPLE_UNCERTAINTY)
         if wanted < bound:
             bound = wanted
-            self._search(clips, self._fast.sample, bound)
-        bound = self._larger_bound(clips, rest, bound, doubt=SAMPLE_DOUBT)
-        self._search(clips, rest[::5] + rest[1::5], bound)
-        rest = [i for i in rest if i not in clips]
-        self._search(clips, rest, self._larger_bound(clips, rest, bound))
-        return clips
+            self._search(fast.sample, bound)
+        bound = self._larger_bound(rest, bound, uncertainty=SAMPLE_UNCERTAINTY)
+        self._search(rest[::5] + rest[1::5], bound)
+        rest = [i for i in rest if i not in self._clips]
+        self._search(rest, self._larger_bound(rest, bound))
 
-    def _larger_bound(
-        self, clips: Mapping[int, _Clip], rest: Sequence[int], bound: float, *, doubt: float = 0
-    ) -> float:
-        """The bound, m, at which the clips that are left are likely to fit, not below one."""
-        wanted = min(self._bound_of(clips, rest, bound, doubt=doubt), MAX_RAISE_FACTOR * bound)
+    def _larger_bound(self, rest: Sequence[int], bound: float, *, uncertainty: float = 0.0) -> float:
+        """The likely bound, m, of the remaining clips, not below one."""
+        wanted = min(self._bound_of(rest, bound, uncertainty=uncertainty), MAX_RAISE_FACTOR * bound)
         return min(max(wanted, bound), self._most)
 
-    def _bound_of(self, clips: Mapping[int, _Clip], some: Sequence[int], bound: float, *, doubt: float) -> float:
-        """The bound, m, at which some clips, and the others as they are, are likely to fit.
+    def _bound_of(self, some: Sequence[int], bound: float, *, uncertainty: float) -> float:
+        """The likely bound, m, of some clips, if the others stay as they are.
 
-        doubt: fraction of the bytes by which what is expected may be wrong.
+        uncertainty: fraction of the expected bytes by which they may differ.
         """
         point, fast = self._fast.first
+        exponent, chosen = self._fast.exponent(bound), set(some)
         other = point.size - sum(fast.values())  # bytes of the file apart from clips
-        spent = sum(each.size for i, each in clips.items() if i not in set(some))
-        here = sum(size_at(each.size, each.bound, bound, self._fast.exponent(bound)) for each in clips.values())
-        ratio = here / max(sum(fast[i] for i in clips), 1.0)
-        available = max(self._max_bytes - other - spent, 1.0)
-        excess = max(ratio * sum(fast[i] for i in some), 1.0) / available
-        if abs(math.log(excess)) <= doubt:
+        used = sum(each.size for i, each in self._clips.items() if i not in chosen)
+        here = sum(size_at(each.size, each.bound, bound, exponent) for each in self._clips.values())
+        ratio = here / max(sum(fast[i] for i in self._clips), 1.0)
+        excess = max(ratio * sum(fast[i] for i in some), 1.0) / max(self._max_bytes - other - used, 1.0)
+        if not self._job.scale or abs(math.log(excess)) <= uncertainty:
             return bound
-        excess *= math.exp(math.copysign(doubt, -math.log(excess)))
-        return bound_for(excess, bound, self._job.scale, self._fast.exponent(bound))
+        excess *= math.exp(math.copysign(uncertainty, -math.log(excess)))
+        return bound_for(excess, bound, self._job.scale, exponent)
 
-    def _repair(self, clips: dict[int, _Clip], point: RatePoint, bound: float) -> None:
+    def _repair(self, point: RatePoint, bound: float) -> None:
         """Search as many clips again, at a larger bound, as are likely to save the bytes too many."""
+        clips = self._clips
         few = len(clips) < MIN_SAMPLED or not point.max_error
         needed = math.inf if few else REPAIR_MARGIN * (point.size - self._max_bytes)
+        exponent = self._fast.exponent(bound)
         saved, chosen = 0.0, []
-        for i in sorted(clips, key=lambda i: clips[i].bound):  # small bounds save most
+        for i in sorted(clips, key=lambda i: clips[i].tried):  # small bounds save most
             if saved >= needed:
                 break
-            saved += clips[i].size - size_at(clips[i].size, clips[i].bound, bound, self._fast.exponent(bound))
+            saved += clips[i].size - size_at(clips[i].size, max(clips[i].tried, clips[i].bound), bound, exponent)
             chosen.append(i)
-        self._search(clips, chosen, bound)
+        self._search(chosen, bound)
 
-    def _repair_bound(self, point: RatePoint) -> float:
-        """A bound, m, that saves the bytes too many, and some more: then not all clips need it."""
-        if len(self._job.chosen) < MIN_SAMPLED or not point.max_error:
-            bound = next_bound(point.max_error, self._job.scale, point, self._max_bytes)
+    def _repair_bound(self, point: RatePoint, step: float = 1.0) -> float:
+        """A bound, m, that is likely to save the bytes too many, and some more: then not all clips need it.
+
+        step: factor on the logarithm of the distance from the largest bound that was searched.
+        """
+        tried = max(each.tried for each in self._clips.values())
+        if not self._job.scale:
+            return self._most
+        if len(self._clips) < MIN_SAMPLED or not tried:
+            bound = next_bound(tried, self._job.scale, point, self._max_bytes)
         else:
             saved = (point.size - self._max_bytes) / max(point.animation, 1) + REPAIR_FRACTION
-            exponent = self._fast.exponent(point.max_error)
-            bound = bound_for(1 / max(1 - saved, 0.1), point.max_error, self._job.scale, exponent)
-        return min(bound, self._most)
+            bound = bound_for(1 / max(1 - saved, 0.1), tried, self._job.scale, self._fast.exponent(tried))
+        return min(bound * (bound / tried) ** (step - 1) if tried else bound, self._most)
 
-    def _search(self, clips: dict[int, _Clip], chosen: Sequence[int], bound: float) -> None:
+    def _search(self, chosen: Sequence[int], bound: float) -> None:
         """Search some clips at a bound, m; a result that is in place and as good within it stays."""
         request = with_bound(self._request, bound)
         found = self._job.search(request, chosen) if chosen else {}
-        for i, size in sizes(found, request).items():
-            if i not in clips or clips[i].bound > bound or size < clips[i].size:
-                clips[i] = _Clip(found[i], bound, size)
+        for i, size in estimate_sizes(found, request).items():
+            old = self._clips.get(i)
+            if old is None or old.bound > bound or size < old.size:
+                self._clips[i] = _Clip(found[i], bound, size, bound)
+            else:
+                self._clips[i] = replace(old, tried=max(old.tried, bound))
 
-    def _written(self, clips: Mapping[int, _Clip]) -> _Result:
-        """The file of these results."""
-        bound = max((each.bound for each in clips.values()), default=0.0)
-        results = {i: each.result for i, each in clips.items()}
-        found = self._job.run(with_bound(self._request, bound), earlier=results)
-        return _Result(found, self._job.point(bound, found))
+    def _write(self) -> _Result:
+        """Return the file of the clips' results."""
+        clips = self._clips.values()
+        bound = max((each.bound for each in clips), default=0.0)
+        tried = min((each.tried for each in clips), default=self._most)
+        return self._write_results({i: each.result for i, each in self._clips.items()}, bound, tried)
+
+    def _write_results(self, results: Mapping[int, ClipResult], bound: float, tried: float) -> _Result:
+        named = replace(with_bound(self._request, bound), given=self._name)
+        found = self._job.run(named, earlier=self._fast.of_all(results))
+        return _Result(found, self._job.point(bound, found), tried)
 
     def _fits(self, result: _Result) -> bool:
         return result.point.size <= self._max_bytes
 
     def _refusal(self, points: Iterable[RatePoint]) -> CheckError:
-        """The error for a limit that none of the points meets."""
+        """Return the error for a limit that none of the points meets."""
         job, most = self._job, self._most
         least = min(points, key=lambda point: point.size)
         percent = f" ({format_number(100 * most / job.scale, 2)} %)" if job.scale else ""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 from anim.files import signals
 from anim.gltf.document import Document
@@ -19,7 +18,7 @@ from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.optimization.clip_optimizer import ClipResult
-from anim.optimization.optimize import Optimized, optimize, search
+from anim.optimization.optimize import Optimized, find_results, optimize
 from anim.optimization.options import Bounds, Request
 from anim.optimization.rate_distortion import RatePoint
 from anim.units import is_zero
@@ -30,6 +29,8 @@ from cli.reports import optimize_report
 from cli.streams import step_streams
 from cli.text import Reporter
 
+START = "fork" if sys.platform == "linux" else "spawn"  # start method of worker processes
+FAST = "fast"  # effort of sizes that are only compared
 DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
 
 
@@ -55,27 +56,45 @@ class OptimizeJob:
     ) -> Optimized:
         """Return the document with the result of the search. earlier: results of clips that are not searched again."""
         searched = [i for i in self.chosen if i not in (earlier or {})]
-        with self._options(searched, verified=verified) as options:
+        with self._progress_shown() as progress:
             return optimize(
-                self.source.document, self.scene, self.clips, request, chosen=self.chosen, earlier=earlier, **options
+                self.source.document,
+                self.scene,
+                self.clips,
+                request,
+                chosen=self.chosen,
+                workers=self._num_workers(searched),
+                start=START,
+                detailed=self.detailed and verified,
+                verified=verified,
+                earlier=earlier,
+                progress=progress,
             )
 
     def search(self, request: Request, chosen: Sequence[int], *, verified: bool = True) -> dict[int, ClipResult]:
         """Return the results of some clips."""
-        with self._options(chosen, verified=verified) as options:
-            return search(self.source.document, self.scene, self.clips, request, chosen=chosen, **options)
+        with self._progress_shown() as progress:
+            return find_results(
+                self.source.document,
+                self.scene,
+                self.clips,
+                request,
+                chosen=chosen,
+                workers=self._num_workers(chosen),
+                start=START,
+                detailed=self.detailed and verified,
+                verified=verified,
+                progress=progress,
+            )
+
+    def _num_workers(self, searched: Sequence[int]) -> int:
+        return self.workers if optimize_report.is_long(self.clips, searched) else 1
 
     @contextmanager
-    def _options(self, searched: Sequence[int], *, verified: bool) -> Iterator[dict[str, Any]]:
-        """Provide how clips are searched, with the progress shown."""
+    def _progress_shown(self) -> Iterator[Callable[[float], None]]:
+        """Provide a function that shows the fraction done."""
         with signals.ignore_broken_pipes():
-            yield {
-                "workers": self.workers if optimize_report.is_long(self.clips, searched) else 1,
-                "start": "fork" if sys.platform == "linux" else "spawn",
-                "detailed": self.detailed and verified,
-                "verified": verified,
-                "progress": lambda share: self.progress(round(1000 * share)),
-            }
+            yield lambda fraction: self.progress(round(1000 * fraction))
         self.progress.close()
 
     def result(self, found: Optimized) -> tuple[Document, int]:
@@ -101,7 +120,7 @@ class OptimizeJob:
 
     def sized(self, request: Request, max_error: float) -> RatePoint:
         """Return the rate-distortion point of a bound, in m, by a fast search."""
-        return self.point(max_error, self.run(replace(with_bound(request, max_error), effort="fast")))
+        return self.point(max_error, self.run(replace(with_bound(request, max_error), effort=FAST)))
 
 
 def with_bound(request: Request, max_error: float) -> Request:

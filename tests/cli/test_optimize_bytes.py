@@ -86,7 +86,44 @@ def test_many_clips_are_searched_little_more_than_once(
     assert apart(call, source, output)["max_error_percent"] <= 1.6 * float(percent)
     assert max(each["max_error_m"] for each in run.json["clips"]) > 0
     assert call("optimize", output, tmp_path / "again.glb", "--max-bytes", str(limit)).code == 0
-    assert (tmp_path / "again.glb").stat().st_size <= limit
+    assert (tmp_path / "again.glb").read_bytes() == output.read_bytes()
+
+
+@pytest.mark.parametrize("percent", ["0.05", "0.7", "3"])
+def test_what_many_clips_take_at_the_ceiling_fits(percent: str, tmp_path: Path, call: Call) -> None:
+    """Some of them reach it first: the others are searched there too before the limit is refused."""
+    source, at_bound, output = tmp_path / "in.glb", tmp_path / "bound.glb", tmp_path / "out.glb"
+    source.write_bytes(_swaying_clips(24))
+    assert call("optimize", source, at_bound, "--max-error", f"{percent}%").code == 0
+    limit = at_bound.stat().st_size
+    ceiling = ("--max-error", f"{percent}%", "--max-bytes", str(limit))
+    assert call("optimize", source, output, *ceiling, "--jobs", "2").code == 0
+    assert output.stat().st_size <= limit
+    assert apart(call, source, output)["max_error_percent"] <= float(percent)
+    call("optimize", source, tmp_path / "one.glb", *ceiling, "--jobs", "1").product()
+    assert (tmp_path / "one.glb").read_bytes() == output.read_bytes()
+
+
+def test_equal_clips_stay_equal(tmp_path: Path, call: Call) -> None:
+    """They share their data, so that one search of each is enough, at one bound."""
+    source, at_bound, output = tmp_path / "in.glb", tmp_path / "bound.glb", tmp_path / "out.glb"
+    source.write_bytes(_swaying_clips(14, repeated=3))
+    assert call("optimize", source, at_bound, "--max-error", "0.05%").code == 0
+    limit = at_bound.stat().st_size
+    assert call("optimize", source, output, "--max-bytes", str(limit)).code == 0
+    assert output.stat().st_size <= limit
+    assert apart(call, source, output)["max_error_percent"] <= 0.08
+    clips = container.read(output.read_bytes()).json["animations"]
+    assert [each["samplers"] for each in clips[:14]] == [each["samplers"] for each in clips[14:28]]
+
+
+def test_many_clips_of_a_model_without_size(tmp_path: Path, call: Call) -> None:
+    source = tmp_path / "in.glb"
+    source.write_bytes(_swaying_clips(13, mesh=False))
+    limit = str(source.stat().st_size // 2)
+    for options in ((), ("--max-error", "1mm")):
+        run = call("optimize", source, tmp_path / "out.glb", "--max-bytes", limit, *options)
+        assert run.code == (0 if options else 6), run.err
 
 
 def _count_searches(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool, int]]:
@@ -108,8 +145,8 @@ def _count_searches(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool, in
     return searched
 
 
-def _swaying_clips(count: int) -> bytes:
-    """A triangle that sways about an axis, in many clips of 60 keys, each with other waves."""
+def _swaying_clips(count: int, *, repeated: int = 1, mesh: bool = True) -> bytes:
+    """A triangle that sways about an axis, in many clips of 60 keys, each with other waves, all so many times."""
     times = np.arange(60) / 30
     chosen = np.random.default_rng(7)
     angles = sum(
@@ -121,8 +158,11 @@ def _swaying_clips(count: int) -> bytes:
     corners = ("VEC3", 5126, np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]))
     arrays = buffered(("SCALAR", 5126, times), corners, *[("VEC4", 5126, each) for each in keys])
     channels = [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}]
-    clips = [{"name": f"c{i}", "samplers": [{"input": 0, "output": 2 + i}], "channels": channels} for i in range(count)]
-    nodes = {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "a", "mesh": 0}]}
+    clips = [
+        {"name": f"c{i}", "samplers": [{"input": 0, "output": 2 + i % count}], "channels": channels}
+        for i in range(repeated * count)
+    ]
+    nodes = {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "a", **({"mesh": 0} if mesh else {})}]}
     meshes = {"meshes": [{"primitives": [{"attributes": {"POSITION": 1}}]}]}
     return glb(json.dumps({"asset": {"version": "2.0"}, **nodes, **meshes, **arrays, "animations": clips}).encode())
 

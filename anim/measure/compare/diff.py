@@ -208,7 +208,7 @@ def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player
         proof = prover.certified(before, after, times, look)
         error, bound = proof.error, proof.bound
     found = statistics(ruler, before, after, times=times, block=look.block, player=player, fps=fps)
-    return _Measured(error, bound, found)
+    return _Measured(error, bound, found.capped(error.max_error))
 
 
 def _lost(ruler: ErrorMetric, before: Clip, after: Clip) -> tuple[tuple[tuple[str, str], ...], ...]:

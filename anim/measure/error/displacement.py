@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -13,7 +13,8 @@ from anim.arrays import Floats, Ints
 
 CHUNK = 1_000_000  # vertices × frames per step: 24 MB
 MAX_GROUP_VALUES = 250_000  # of the same, of one group with many vertices
-MAX_SINGLE = 1e15  # of products in float32, m: their squares, and sums of squares, are finite
+MAX_SINGLE = 1e15  # m, of terms in float32: their squares, and sums of squares, are finite
+MAX_TERM_RATIO = 20.0  # of the largest term of a vector to the longest vector; beyond it float32 loses digits
 FIRST = 8  # frames evaluated before the bounds of the others are updated
 
 
@@ -59,8 +60,9 @@ class BoundGroups:
 
     @cached_property
     def largest(self) -> float:
-        """The largest number of all products."""
-        return max((float(np.abs(each).max(initial=0.0)) for each in self.products), default=0.0)
+        """The largest coordinate in all products."""
+        coordinates = (each.reshape(len(each), -1, 4)[..., :3] for each in self.products)
+        return max((float(np.abs(each).max(initial=0.0)) for each in coordinates), default=0.0)
 
 
 class SkinnedDisplacement:
@@ -79,12 +81,11 @@ class SkinnedDisplacement:
         """(J, F), upper bounds of the lengths of vectors with influence of a joint."""
         return np.asarray(self._groups.fraction * largest_over(self._groups.corners, self._moved))
 
-    def in_single_precision(self) -> SkinnedDisplacement:
-        """Return the same in float32, unless squares of lengths could overflow there."""
-        largest = self._groups.largest * float(np.abs(self._moved).max(initial=0.0))
-        if largest > MAX_SINGLE:
-            return self
-        return SkinnedDisplacement(self._groups.single, self._moved.astype(np.float32))
+    def in_single_precision(self) -> tuple[SkinnedDisplacement, float]:
+        """Return the same in float32, and the largest term, m, of the sums that are its vectors."""
+        turned = float(np.abs(self._moved[..., :3]).max(initial=0.0))
+        largest = max(self._groups.largest * turned, float(np.abs(self._moved[..., 3]).max(initial=0.0)))
+        return SkinnedDisplacement(self._groups.single, self._moved.astype(np.float32)), largest
 
     def rate(self, step: Floats) -> DisplacementField:
         """Return the rates of change of the vectors between frames. step: (F − 1,) s from each to the next."""
@@ -232,20 +233,27 @@ def _lengths(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(squares, out=squares))
 
 
-def lengths_by_group(field: DisplacementField, groups: int, frames: Ints) -> Iterator[Floats]:
-    """Yield the lengths of the vectors of all groups in some frames, in the order of groups, vertices, frames: flat.
+def lengths_by_group(field: DisplacementField, groups: int, frames: Ints) -> list[Floats]:
+    """Return the lengths of the vectors of all groups in some frames, in the order of groups, vertices, frames: flat.
 
-    Skinned ones are computed in float32, in half of the time: products of differences of matrices, which lose nothing
-    by cancellation but for the sum over joints, are right to about a millionth.
+    Skinned ones are computed in float32, in half of the time, where the longest is right to about a millionth there:
+    not if terms cancel, as those of a model far from the origin do.
     """
     if isinstance(field, SkinnedDisplacement):
-        field = field.in_single_precision()
-        if (found := field.uniform_vectors(frames)) is not None:
-            found *= found
-            yield np.sqrt(found.sum(axis=2)).reshape(-1)
-            return
-    for group in range(groups):
-        yield lengths(field, group, frames).reshape(-1)
+        single, largest = field.in_single_precision()
+        if largest < MAX_SINGLE:
+            found = _flat_lengths(single, groups, frames)
+            longest = max((float(each.max(initial=0.0)) for each in found), default=0.0)
+            if largest <= MAX_TERM_RATIO * longest:
+                return found
+    return _flat_lengths(field, groups, frames)
+
+
+def _flat_lengths(field: DisplacementField, groups: int, frames: Ints) -> list[Floats]:
+    if isinstance(field, SkinnedDisplacement) and (found := field.uniform_vectors(frames)) is not None:
+        found *= found
+        return [np.sqrt(found.sum(axis=2)).reshape(-1)]
+    return [lengths(field, group, frames).reshape(-1) for group in range(groups)]
 
 
 def max_displacement(field: DisplacementField, *, floor: float, slack: float, most: int) -> MaxDisplacement:

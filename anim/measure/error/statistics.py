@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -47,6 +47,10 @@ class Statistics(NamedTuple):
     angle: Peak
     speed: Peak
     weight: Peak
+
+    def capped(self, max_error: float) -> Self:
+        """Return these statistics with no distance above the largest one, m: they are rounded, it is not."""
+        return self._replace(mean=min(self.mean, max_error), p99=min(self.p99, max_error))
 
 
 def statistics(

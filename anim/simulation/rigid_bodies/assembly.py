@@ -10,7 +10,7 @@ from anim.arrays import Floats
 from anim.errors import AnimError, FormatError, RangeError
 from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Skeleton
-from anim.model.skeleton import nearest_ancestors, node_mask
+from anim.model.skeleton import nearest_at_or_above, node_mask
 from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription, Shape, Vector
 from anim.simulation.rigid_bodies.rigid_scene import (
     WORLD,
@@ -62,17 +62,11 @@ def assemble(
 
 def _colliders_by_owner(description: PhysicsDescription, skeleton: Skeleton) -> dict[int, list[int]]:
     """Nodes with a collider by the nearest node with a motion, from their own upwards; −1 for none."""
-    moved = node_mask(skeleton, description.motions)
-    nearest = nearest_ancestors(skeleton.parents, moved)
+    owners = nearest_at_or_above(skeleton.parents, node_mask(skeleton, description.motions)).tolist()
     found: dict[int, list[int]] = {}
     for node in description.colliders:
-        found.setdefault(node if moved[node] else int(nearest[node]), []).append(node)
+        found.setdefault(owners[node], []).append(node)
     return found
-
-
-def find_owner(skeleton: Skeleton, node: int, description: PhysicsDescription) -> int:
-    """Return the nearest node with a motion, from `node` upwards; −1 for none."""
-    return next((each for each in ancestors(skeleton, node) if each in description.motions), -1)
 
 
 def ancestors(skeleton: Skeleton, node: int) -> list[int]:
@@ -126,9 +120,10 @@ def _joints(
     description: PhysicsDescription, skeleton: Skeleton, indices: dict[int, int], frames: Sequence[Frame]
 ) -> list[RigidJoint]:
     found = []
+    carriers = _carriers(skeleton, description, indices) if description.joints else []
     for joint in description.joints:
         ends = (joint.node, joint.connected)
-        owners = [_carrier(skeleton, node, description, indices) for node in ends]
+        owners = [carriers[node] for node in ends]
         if max(owners) < 0:
             raise FormatError("a joint connects no body", where=skeleton.label(joint.node))
         if owners[0] == owners[1]:
@@ -142,10 +137,16 @@ def _joints(
     return found
 
 
-def _carrier(skeleton: Skeleton, node: int, description: PhysicsDescription, indices: dict[int, int]) -> int:
-    """Node of the body that carries a joint's frame: with a motion, or with an animated collider; −1 for the world."""
-    owner = find_owner(skeleton, node, description)
-    return owner if owner >= 0 else next((each for each in ancestors(skeleton, node) if each in indices), -1)
+def _carriers(skeleton: Skeleton, description: PhysicsDescription, indices: dict[int, int]) -> list[int]:
+    """For every node the body that carries a joint's frame there: with a motion, or an animated collider; −1 for none.
+
+    indices: of the bodies, by node.
+    """
+    moved, held = (
+        nearest_at_or_above(skeleton.parents, node_mask(skeleton, nodes)) for nodes in (description.motions, indices)
+    )
+    found: list[int] = np.where(moved >= 0, moved, held).tolist()
+    return found
 
 
 def _floor(description: PhysicsDescription) -> RigidBody:

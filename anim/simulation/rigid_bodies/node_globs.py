@@ -11,7 +11,7 @@ from anim.arrays import Ints
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
 from anim.maths import hierarchy
 from anim.model import MeshInstance, Scene
-from anim.model.skeleton import nearest_ancestors, node_mask
+from anim.model.skeleton import nearest_at_or_above, node_mask
 from anim.simulation.rigid_bodies.description import Collider, Material, Motion, PhysicsDescription, Shape
 from anim.simulation.rigid_bodies.shapes import mesh_shape
 
@@ -68,9 +68,8 @@ class _MeshNodes:
 
     def __init__(self, scene: Scene, motions: Iterable[int]) -> None:
         parents = scene.skeleton.parents
-        moved = node_mask(scene.skeleton, motions)
         self._first, self._end = hierarchy.find_subtrees(parents)
-        self._body = np.where(moved, np.arange(len(parents)), nearest_ancestors(parents, moved))  # −1 for none
+        self._body = nearest_at_or_above(parents, node_mask(scene.skeleton, motions))
         self._nodes: dict[int, list[int]] = {}  # by body
         for instance in scene.instances:
             self._nodes.setdefault(int(self._body[instance.node]), []).append(instance.node)

@@ -101,3 +101,12 @@ def test_nodes_with_those_below_and_above_them(depth: int) -> None:
             parent = int(parents[parent])
     assert (hierarchy.with_descendants(parents, chosen) == below).all()
     assert (hierarchy.with_ancestors(parents, chosen) == above).all()
+
+
+def test_depths_and_who_is_below_whom_by_hand() -> None:
+    """0 ← 1 ← 2, 0 ← 3, and another root, 4."""
+    parents = np.array([-1, 0, 1, 0, -1])
+    assert hierarchy.find_depths(parents).tolist() == [0, 1, 2, 1, 0]
+    subtrees = hierarchy.find_subtrees(parents)
+    pairs = [(i, j) for i in range(5) for j in range(5) if hierarchy.is_below(subtrees, i, j)]
+    assert pairs == [(1, 0), (2, 0), (2, 1), (3, 0)]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
+from anim.maths import quaternion
 from anim.measure.error.displacement import (
     BoundGroups,
     DisplacementRate,
@@ -89,6 +90,18 @@ def test_the_joint_that_moves_a_vertex_most_is_named(field: SkinnedDisplacement)
 def test_statistics_have_the_lengths_in_single_precision(field: SkinnedDisplacement, scale: float) -> None:
     """But for lengths whose squares do not fit into float32."""
     scaled = SkinnedDisplacement(field._groups, scale * field._moved)
-    found = np.concatenate(list(lengths_by_group(scaled, 3, np.arange(FRAMES))))
+    found = np.concatenate(lengths_by_group(scaled, 3, np.arange(FRAMES)))
     assert found.dtype == (np.float64 if scale > 1 else np.float32)
     np.testing.assert_allclose(found, np.concatenate([each.ravel() for each in _all(scaled, FRAMES)]), rtol=3e-6)
+
+
+def test_terms_that_cancel_are_added_in_double_precision() -> None:
+    """A model 10 km from the origin that turns about itself."""
+    far = np.array([1e4, 0.0, 0.0])
+    points = far + RNG.normal(size=(VERTICES, 3))
+    angles = np.linspace(0.1, 0.2, FRAMES)
+    turns = quaternion.to_matrix(quaternion.from_rotation_vector(np.outer(angles, [0.0, 0.0, 1.0]))) - np.eye(3)
+    moved = np.concatenate((turns, -(turns @ far)[..., None]), axis=-1)[None]
+    groups = BoundGroups([np.array([0])], [np.column_stack((points, np.ones(VERTICES)))], points[None])
+    found = lengths_by_group(SkinnedDisplacement(groups, moved), 1, np.arange(FRAMES))[0].reshape(VERTICES, FRAMES)
+    np.testing.assert_allclose(found, np.linalg.norm((points - far) @ turns.swapaxes(1, 2), axis=-1).T, rtol=1e-7)
