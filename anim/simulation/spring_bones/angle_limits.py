@@ -48,8 +48,10 @@ class AngleLimit:
     def __post_init__(self) -> None:
         check_quantity(self.angle, "pitch" if self.shape is LimitShape.SPHERICAL else "angle", least=0.0)
         check_quantity(self.yaw, "yaw", least=0.0)
-        if not (np.isfinite(self.rotation).all() and any(self.rotation)):
+        if not (np.isfinite(self.rotation).all() and np.linalg.norm(self.rotation)):
             raise RangeError(f"rotation is {self.rotation} (expected a unit quaternion)")
+        x, y, z, w = map(float, self.rotation)  # squares of integers could overflow
+        object.__setattr__(self, "rotation", (x, y, z, w))
 
 
 class AngleLimits:

@@ -44,6 +44,8 @@ class SpringParameters:
         check_quantity(max(map(abs, self.gravity)), "gravity", least=0.0, most=MAX_FORCE)
         check_quantity(self.hit_radius, "hit radius", least=0.0)
         check_quantity(self.damping_ratio, "damping ratio", least=0.0, most=MAX_DAMPING_RATIO)
+        for name in ("stiffness", "drag", "hit_radius", "damping_ratio"):
+            object.__setattr__(self, name, float(getattr(self, name)))  # numpy has no type for the integers of JSON
         if self.frequency is not None:
             check_quantity(self.frequency, "frequency", least=MIN_FREQUENCY_HZ, most=MAX_FREQUENCY_HZ)
 

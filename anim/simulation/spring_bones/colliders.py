@@ -46,6 +46,7 @@ class Collider:
         for field in ("offset", "tail", "normal"):
             object.__setattr__(self, field, check_vector(getattr(self, field), field))
         check_quantity(self.radius, "radius", least=0.0)
+        object.__setattr__(self, "radius", float(self.radius))  # numpy has no type for the integers of JSON
         if self.shape is ColliderShape.PLANE and not any(self.normal):
             raise RangeError("normal is 0, 0, 0 (expected a direction)")
 
