@@ -14,7 +14,8 @@ from anim.memory import MemoryBudget
 from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
 from anim.operations.selection import track_indices
 from anim.sampling import derivatives
-from anim.sampling.batch import Batch, batches
+from anim.sampling.batch import Batch
+from anim.sampling.lazy_batch import batches
 from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from anim.arrays import Bools, Floats, freeze
 from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
-from anim.sampling.batch import batches, lazy_batches
+from anim.sampling.lazy_batch import batches, lazy_batches
 
 MAX_VALUES = 1 << 18  # keys × components of tracks changed together: of long ones few, for memory
 

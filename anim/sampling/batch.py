@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from itertools import compress
 from typing import TypeAlias
 
 import numpy as np
@@ -71,38 +71,16 @@ class Batch(TrackGroup):
         place = place or find_interval(self.times, at)
         return interpolate(place, self.values, self.tangents, self.interpolation, self.kind)
 
+    def take(self, keys: slice | Ints, time_axis: TimeAxis) -> Batch:
+        """Return some of the keys, with their times."""
+        tangents = self.tangents and (self.tangents[0][keys], self.tangents[1][keys])
+        return Batch(self.tracks, self.numbers, time_axis, self.values[keys], tangents)
 
-class LazyBatch:
-    """Tracks of one rule with the same times, with keys stacked on demand.
-
-    All keys are stacked once half of them are requested in one call, or twice as many in all calls together. Before,
-    only the requested ones are: a long clip sampled from start to end is not in memory twice, and starts sooner.
-    """
-
-    def __init__(self, tracks: tuple[Track, ...], numbers: Ints) -> None:
-        self.tracks, self.numbers = tracks, numbers
-        self.time_axis = tracks[0].time_axis
-        self._stacked = 0
-        self._whole: Batch | None = None
-
-    @property
-    def whole(self) -> Batch:
-        """All keys."""
-        if self._whole is None:
-            values, tangents = _stack_values(self.tracks, partial(np.stack, axis=1))
-            self._whole = Batch(self.tracks, self.numbers, self.time_axis, values, tangents)
-        return self._whole
-
-    def at(self, place: KeyInterval) -> tuple[Batch, KeyInterval]:
-        """Return a batch with the keys of `place`, and `place` relative to that batch."""
-        low, high = (int(place.left.min()), int(place.right.max()) + 1) if len(place.left) else (0, 1)
-        self._stacked += high - low
-        keys = len(self.time_axis)
-        if self._whole is not None or 2 * (high - low) >= keys or self._stacked > 2 * keys:
-            return self.whole, place
-        joined = _stack_values(self.tracks, lambda each: np.stack([values[low:high] for values in each], axis=1))
-        moved = place._replace(left=place.left - low, right=place.right - low)
-        return Batch(self.tracks, self.numbers, TimeAxis(self.time_axis.times[low:high]), *joined), moved
+    def pick(self, chosen: Bools) -> Batch:
+        """Return the chosen (G,) of the tracks."""
+        tangents = self.tangents and (self.tangents[0][:, chosen], self.tangents[1][:, chosen])
+        tracks = tuple(compress(self.tracks, chosen.tolist()))
+        return Batch(tracks, self.numbers[chosen], self.time_axis, self.values[:, chosen], tangents)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,39 +113,6 @@ class MixedBatch(TrackGroup):
         """Return the values (F, G, C) at times `at` (F,). place: of `find_intervals`."""
         del at
         return interpolate(place, self.values, self.tangents, self.interpolation, self.kind)
-
-
-def mixed_batches(tracks: Iterable[Track]) -> tuple[list[LazyBatch], list[MixedBatch]]:
-    """Return `tracks` grouped by rule: those of one time axis, and those of several."""
-    tracks, groups = tuple(tracks), dict[Rule, list[int]]()
-    for i, track in enumerate(tracks):
-        groups.setdefault(_rule(track), []).append(i)
-    single, mixed = [], []
-    for group in groups.values():
-        chosen = tuple(tracks[i] for i in group)
-        axes = tuple(dict.fromkeys(track.time_axis for track in chosen))
-        if len(axes) == 1:
-            single.append(LazyBatch(chosen, np.array(group)))
-            continue
-        index = {axis: i for i, axis in enumerate(axes)}
-        axis_of = np.array([index[track.time_axis] for track in chosen])
-        counts = np.array([len(track.values) for track in chosen])
-        joined = _stack_values(chosen, np.concatenate)
-        mixed.append(MixedBatch(chosen, np.array(group), axes, axis_of, np.cumsum(counts) - counts, *joined))
-    return single, mixed
-
-
-def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:
-    """Return `tracks` grouped by time axis and rule, in the order of their first members."""
-    tracks, groups = tuple(tracks), dict[tuple[TimeAxis, Rule], list[int]]()
-    for i, track in enumerate(tracks):
-        groups.setdefault((track.time_axis, _rule(track)), []).append(i)
-    return [LazyBatch(tuple(tracks[i] for i in group), np.array(group)) for group in groups.values()]
-
-
-def batches(tracks: Iterable[Track]) -> list[Batch]:
-    """Return `tracks` stacked by the groups of `lazy_batches`."""
-    return [each.whole for each in lazy_batches(tracks)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,10 +181,15 @@ def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
 
     A group of over MAX_GROUP_KEYS keys is split between its tracks.
     """
+    return list(iterate_concatenated(tracks))
+
+
+def iterate_concatenated(tracks: Sequence[Track]) -> Iterator[ConcatenatedTracks]:
+    """Yield the groups of `concatenate`, so that keys of one need to be in memory twice at a time."""
     groups: dict[Rule, list[list[int]]] = {}
     room: dict[Rule, int] = {}
     for i, track in enumerate(tracks):
-        key = _rule(track)
+        key = rule_of(track)
         left = room.get(key, 0)
         if left <= 0:
             groups.setdefault(key, []).append([])
@@ -247,24 +197,23 @@ def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
         groups[key][-1].append(i)
         room[key] = left - len(track.values)
     parts = [numbers for group in groups.values() for numbers in group]
-    return [_flatten_keys(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts]
+    return (_flatten_keys(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts)
 
 
 def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints) -> ConcatenatedTracks:
     counts = np.array([len(track.values) for track in tracks])
     starts = np.cumsum(counts) - counts
     times = np.concatenate([track.times for track in tracks])
-    return ConcatenatedTracks(tracks, numbers, counts, starts, times, *_stack_values(tracks, np.concatenate))
+    return ConcatenatedTracks(tracks, numbers, counts, starts, times, *stack_values(tracks, np.concatenate))
 
 
-def _rule(track: Track) -> Rule:
+def rule_of(track: Track) -> Rule:
+    """Return what tracks of one batch have in common."""
     return track.path, track.interpolation, track.kind, track.values.shape[1]
 
 
-def _stack_values(
-    tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]
-) -> tuple[Floats, Tangents | None]:
-    """Values of tracks of one rule, and their in and out tangents, None without CUBICSPLINE.
+def stack_values(tracks: Sequence[Track], join: Callable[[Sequence[Floats]], Floats]) -> tuple[Floats, Tangents | None]:
+    """Return the values of tracks of one rule, and their in and out tangents, None without CUBICSPLINE.
 
     join: makes one array of each track's (K, C).
     """

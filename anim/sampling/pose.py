@@ -14,7 +14,8 @@ from anim.arrays import Floats, Ints
 from anim.errors import NotFoundError
 from anim.model import Clip, Pose, Skeleton, TimeAxis, ValueKind
 from anim.model.track import NUM_COMPONENTS
-from anim.sampling.batch import Batch, ConcatenatedTracks, MixedBatch, mixed_batches
+from anim.sampling.batch import Batch, ConcatenatedTracks, MixedBatch
+from anim.sampling.lazy_batch import mixed_batches
 from anim.sampling.track import KeyInterval, find_interval
 from anim.sampling.weight_pointers import resolve_weight_pointers
 from anim.sampling.world import world_by_node
@@ -91,7 +92,9 @@ class PoseSampler:
     def _located(self, places: Mapping[TimeAxis, KeyInterval]) -> Iterator[tuple[Batch | MixedBatch, KeyInterval]]:
         """Yield every batch with the key intervals of its tracks."""
         for stack in self._stacks:
-            yield stack.at(places[stack.time_axis])
+            place = places[stack.time_axis]
+            batch, left, right = stack.at(place.left, place.right)
+            yield batch, place._replace(left=left, right=right)
         for mixed in self._mixed:
             yield mixed, mixed.find_intervals(places)
 

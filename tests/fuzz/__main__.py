@@ -1,8 +1,9 @@
-"""python -m tests.fuzz [FAMILY ...] [--count N] [--seed S] [--seconds T] [--keep FOLDER]: fuzz the commands.
+"""python -m tests.fuzz [FAMILY ...] [--count N] [--seed S] [--seconds T] [--sweep] [--keep FOLDER]: fuzz the commands.
 
 Families: gltf, euler, cache, usd, usd-layers, springs, bodies, settings, and rigs, whose outputs are judged; all if
 none is given. Runs mutations of fixtures until N of each family are done, or T seconds have passed; prints each new
-kind of fault, and keeps its input in FOLDER, as one JSON file. Such a file in tests/fuzz/found is a test from then on.
+kind of fault, and keeps its input in FOLDER, as one JSON file. With --sweep the mutations are not random: every value
+of every JSON is replaced by each of a list. Such a file in tests/fuzz/found is a test from then on.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ import time
 import warnings
 import zlib
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.fuzz import usd_layers
 from tests.fuzz.execution import BATCH, Job, Outcome, run_jobs
 from tests.fuzz.families import FAMILIES, jobs, look, problems, sound_jobs
+from tests.fuzz.sweep import sweep_jobs
 
 
 def main() -> int:
@@ -34,6 +37,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=3600)
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--sweep", action="store_true")
     parser.add_argument("--replay", type=Path)
     given = parser.parse_args()
     faults: Counter[str] = Counter()
@@ -44,11 +48,11 @@ def main() -> int:
     for family in families:
         warm(family)
     end = time.monotonic() + given.seconds
-    for first in itertools.count(given.first, BATCH):
-        if time.monotonic() > end or first >= given.first + given.count:
+    count = given.count
+    for name, batch in swept_batches(families) if given.sweep else batches(families, given.seed, given.first, count):
+        if time.monotonic() > end:
             break
-        for family in families:
-            run_batch(family, given.seed, first, faults, done, given.keep)
+        run_batch(name, batch, faults, done, given.keep)
     print(f"{dict(done)} runs, {sum(faults.values())} faults of {len(faults)} kinds")  # noqa: T201
     return int(bool(faults))
 
@@ -81,19 +85,34 @@ def warm(family: str) -> None:
             os.chdir(here)
 
 
-def run_batch(family: str, seed: int, first: int, faults: Counter[str], done: Counter[str], keep: Path | None) -> None:
+def batches(families: Sequence[str], seed: int, first: int, count: int) -> Iterator[tuple[str, dict[int, Job]]]:
+    """Yield family and seed, and some of its jobs by number, in turn for all families."""
+    for start in range(first, first + count, BATCH):
+        numbers = range(start, start + BATCH)
+        for family in families:
+            yield f"{family} {seed}", dict(zip(numbers, jobs(family, seed, numbers), strict=True))
+
+
+def swept_batches(families: Sequence[str]) -> Iterator[tuple[str, dict[int, Job]]]:
+    """Yield family and "sweep", and some of the jobs of its sweep by number."""
+    for family in families:
+        every = enumerate(sweep_jobs(family))
+        while batch := dict(itertools.islice(every, BATCH)):
+            yield f"{family} sweep", batch
+
+
+def run_batch(name: str, batch: dict[int, Job], faults: Counter[str], done: Counter[str], keep: Path | None) -> None:
     """Run a batch and count its faults by kind."""
-    batch = jobs(family, seed, range(first, first + BATCH))
-    for number, (job, outcome) in enumerate(zip(batch, run_jobs(batch, look), strict=True), first):
-        done[family] += 1
+    for (number, job), outcome in zip(batch.items(), run_jobs(list(batch.values()), look), strict=True):
+        done[name.split()[0]] += 1
         found = problems(job, outcome)
         if found:
             kind = kind_of(job, outcome, found)
             faults[kind] += 1
             if faults[kind] == 1:
-                print(f"{family} {seed} {number}: {' '.join(job.line)}: {kind}", flush=True)  # noqa: T201
+                print(f"{name} {number}: {' '.join(job.line)}: {kind}", flush=True)  # noqa: T201
                 if keep is not None:
-                    save(job, keep / f"{family}-{seed}-{number}.json")
+                    save(job, keep / f"{name.replace(' ', '-')}-{number}.json")
 
 
 def kind_of(job: Job, outcome: Outcome, found: list[str]) -> str:

@@ -92,17 +92,18 @@ def _job(family: str, chosen: Random) -> Job:
     sound = chosen.choice(seeds(family))
     name = chosen.choice(sound.mutated)
     changed = mutate(name, sound.files[name], chosen)
-    return Job(_words(chosen.choice(sound.lines), sound.main), {**sound.files, name: changed})
+    return Job(command_words(chosen.choice(sound.lines), sound.main), {**sound.files, name: changed})
 
 
 def sound_jobs(family: str) -> list[Job]:
     """Return a job for each command line on a sound file; they must succeed, and compile all kernels."""
     if family == RIGS:
         return warm_jobs()
-    return [Job(_words(line, each.main), each.files) for each in seeds(family) for line in each.lines]
+    return [Job(command_words(line, each.main), each.files) for each in seeds(family) for line in each.lines]
 
 
-def _words(line: str, name: str) -> list[str]:
+def command_words(line: str, name: str) -> list[str]:
+    """Return the words of a command line on a file."""
     return [name if word == "IN" else word for word in line.split()]
 
 

@@ -13,9 +13,9 @@ from random import Random
 from typing import Any
 
 VALUES: tuple[Any, ...] = (  # in place of any value of a JSON
-    None, True, False, 0, 1, -1, 2, 3, 255, 65535, 65536, 2**31 - 1, 2**31, 2**53, 2**64, 10**30, 0.5, -0.5, 1e-45,
-    1e-320, 1e38, 3.5e38, 1e300, "", "x", "\0", "\ud800", "x" * 3000, "../a", "/", [], {}, [[]], [None], [0], [-1],
-    [1e38], [0] * 3, [0] * 4, [1] * 16, ["x"], {"x": 1},
+    None, True, False, 0, 1, -1, 2, 3, 255, 65535, 65536, 2**31 - 1, 2**31, 2**53, 2**64, 10**30, -(10**200), 0.5, -0.5,
+    1e-45, 1e-320, 1e38, 3.5e38, 1e300, "", "x", "\0", "\ud800", "x" * 3000, "../a", "/", [], {}, [[]], [None], [0],
+    [-1], [1e38], [0] * 3, [0] * 4, [1] * 16, ["x"], {"x": 1},
 )  # fmt: skip
 WORDS = (  # in place of a word of a text
     b"", b"0", b"-1", b"1", b"9" * 20, b"9" * 5000, b"1e400", b"1e300", b"1e-320", b"1e38", b"nan", b"inf", b"-inf",
@@ -53,9 +53,9 @@ def mutate_bytes(data: bytes, chosen: Random) -> bytes:
 
 def mutate_json(document: Any, chosen: Random) -> None:
     """Change values of a JSON in place: other ones, those of elsewhere, none, or one more."""
-    places = list(_places(document))
+    values = list(places(document))
     for _ in range(chosen.choice((1, 1, 1, 2, 3))):
-        parent, key = chosen.choice(places)
+        parent, key = chosen.choice(values)
         try:
             match chosen.randrange(6):
                 case 0:
@@ -63,7 +63,7 @@ def mutate_json(document: Any, chosen: Random) -> None:
                 case 1 if isinstance(parent, list):
                     parent.insert(key, parent[key])
                 case 2:
-                    other, name = chosen.choice(places)
+                    other, name = chosen.choice(values)
                     parent[key] = json.loads(json.dumps(other[name]))
                 case 3 if type(parent[key]) in (int, float):
                     parent[key] += chosen.choice((-1, 1, 2, 100))
@@ -73,11 +73,12 @@ def mutate_json(document: Any, chosen: Random) -> None:
             continue
 
 
-def _places(value: Any) -> Any:
+def places(value: Any) -> Any:
+    """Yield container and key of each value of a JSON."""
     for key in value if isinstance(value, dict) else range(len(value)):
         yield value, key
         if isinstance(value[key], dict | list):
-            yield from _places(value[key])
+            yield from places(value[key])
 
 
 def mutate_floats(data: bytes, chosen: Random) -> bytes:

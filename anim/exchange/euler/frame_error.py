@@ -9,7 +9,8 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, ValueKind
-from anim.sampling.batch import Batch, batches, lazy_batches
+from anim.sampling.batch import Batch
+from anim.sampling.lazy_batch import batches, lazy_batches
 
 BLOCK_VALUES = 1 << 16  # rotations compared at a time
 

@@ -20,7 +20,7 @@ from anim.maths.euler import AxesConvention
 from anim.memory import MemoryBudget
 from anim.model import Clip, Interpolation, Skeleton, TimeAxis, Track
 from anim.sampling import frame_times
-from anim.sampling.batch import batches
+from anim.sampling.lazy_batch import batches
 from anim.sampling.times import just_before, key_times
 from anim.sampling.track import sample
 

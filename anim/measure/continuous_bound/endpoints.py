@@ -14,6 +14,7 @@ from anim.measure.continuous_bound.intervals import IntervalKeys, Intervals
 from anim.measure.continuous_bound.node_tracks import NodeTracks, pairs_of
 from anim.model import Interpolation
 from anim.sampling.batch import Batch
+from anim.sampling.lazy_batch import LazyBatch
 
 
 class Endpoints(NamedTuple):
@@ -35,16 +36,22 @@ def endpoints(tracks: Sequence[NodeTracks]) -> Endpoints:
     for each, pairs in pairs_of(tracks):
         parts = [each.view(whole[..., pairs]) for whole in found]
         parts[0][...] = each.rest.T[:, :, None]
-        for batch in each.tracks:
-            rows = each.rows(batch)
-            for part, values in zip(parts, of_batch(batch, each.where), strict=True):
+        for lazy in each.tracks:
+            rows = each.rows(lazy)
+            for part, values in zip(parts, of_batch(*keys_of(lazy, each.where)), strict=True):
                 part[..., rows, :] = values
     return found
 
 
-def of_batch(batch: Batch, where: Intervals) -> Endpoints:
-    """Return the endpoints (2, C, U, G) of a batch's U tracks; rotations not normalized."""
-    at = where.on(batch.time_axis)
+def keys_of(tracks: LazyBatch, where: Intervals) -> tuple[Batch, IntervalKeys]:
+    """Return the keys of tracks in intervals, stacked, and the intervals' positions on these."""
+    at = where.on(tracks.time_axis)
+    batch, left, right = tracks.at(at.left, at.right)
+    return batch, at._replace(left=left, right=right)
+
+
+def of_batch(batch: Batch, at: IntervalKeys) -> Endpoints:
+    """Return the endpoints (2, C, U, G) of a batch's U tracks; rotations not normalized. at: positions on its keys."""
     start, end = batch.values[at.left].T, batch.values[at.right].T  # (C, U, G)
     if batch.interpolation is Interpolation.STEP:
         nothing = np.zeros((2, *start.shape))

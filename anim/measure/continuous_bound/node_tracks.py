@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats, Ints
 from anim.measure.continuous_bound.intervals import Intervals
 from anim.measure.continuous_bound.track_partition import ClipVersion, nodes_of
-from anim.sampling.batch import Batch
+from anim.sampling.lazy_batch import LazyBatch
 
 MAX_PAIRS = 2048  # of nodes and intervals at a time: arrays of four players fit into the processor's cache
 
@@ -30,7 +30,7 @@ class NodeTracks(NamedTuple):
 
     nodes: Ints
     rest: Floats
-    tracks: Sequence[Batch]
+    tracks: Sequence[LazyBatch]
     where: Intervals
 
     @property
@@ -38,7 +38,7 @@ class NodeTracks(NamedTuple):
         """Number of pairs of a node and an interval."""
         return len(self.nodes) * len(self.where)
 
-    def rows(self, batch: Batch) -> Ints:
+    def rows(self, batch: LazyBatch) -> Ints:
         """Return the indices among `nodes` of the nodes of a batch."""
         return np.searchsorted(self.nodes, nodes_of(batch))
 
@@ -54,7 +54,7 @@ class NodeIntervals(NamedTuple):
     """
 
     nodes: Ints
-    tracks: tuple[Sequence[Batch], Sequence[Batch]]
+    tracks: tuple[Sequence[LazyBatch], Sequence[LazyBatch]]
     where: Intervals
     columns: slice
 
@@ -83,7 +83,7 @@ def late_nodes(of: ClipSpan) -> set[int]:
         batch
         for version in of.versions
         for batch in version.still
-        if batch.path == "rotation" and batch.times[-1] > of.where.edges[1]
+        if batch.path == "rotation" and batch.time_axis.times[-1] > of.where.edges[1]
     )
     return {node for batch in late for node in nodes_of(batch)}
 

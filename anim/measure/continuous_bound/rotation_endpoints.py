@@ -13,7 +13,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats
 from anim.maths import quaternion
-from anim.measure.continuous_bound.endpoints import of_batch
+from anim.measure.continuous_bound.endpoints import keys_of, of_batch
 from anim.measure.continuous_bound.node_tracks import NodeTracks, pairs_of
 from anim.model import Interpolation
 from anim.sampling.players import GLTF, PLAYERS, is_divided
@@ -80,7 +80,7 @@ def rotation_endpoints(tracks: Sequence[NodeTracks], *, players: Sequence[str]) 
 
 def _keys(tracks: Sequence[NodeTracks]) -> _Keys:
     num_pairs = sum(each.num_pairs for each in tracks)
-    is_cubic = any(batch.tangents is not None for each in tracks for batch in each.tracks)
+    is_cubic = any(lazy.is_cubic for each in tracks for lazy in each.tracks)
     cubic = np.zeros((2, 2, 4, 1, num_pairs if is_cubic else 0))
     mixed, tracked, last, ended, cubics = np.zeros((5, num_pairs), np.bool_)
     found = _Keys(np.empty((2, 4, num_pairs)), np.zeros((2, num_pairs)), mixed, tracked, last, ended, cubic, cubics)
@@ -94,15 +94,15 @@ def _write_keys(of: NodeTracks, into: _Keys) -> None:
     """Write the keys of one clip's nodes into views (..., U, G) of those of all pairs."""
     into.keys[...] = of.rest.T[:, :, None]
     into.last[:, -1:], into.ended[...] = True, True
-    for batch in of.tracks:
-        rows = of.rows(batch)
-        into.tracked[rows], into.ended[rows] = True, of.where.edges[-1] >= batch.times[-1]
+    for lazy in of.tracks:
+        rows = of.rows(lazy)
+        into.tracked[rows], into.ended[rows] = True, of.where.edges[-1] >= lazy.time_axis.times[-1]
+        batch, at = keys_of(lazy, of.where)
         if batch.tangents is not None:
-            value, slope, bend = of_batch(batch, of.where)
+            value, slope, bend = of_batch(batch, at)
             into.keys[..., rows, :], into.is_cubic[rows] = value, True
             into.cubic[..., rows, :] = np.stack((slope, bend))[:, :, :, None]
             continue
-        at = of.where.on(batch.time_axis)
         into.keys[0][:, rows] = batch.values[at.left].T
         is_linear = batch.interpolation is Interpolation.LINEAR
         into.keys[1][:, rows] = batch.values[at.right].T if is_linear else into.keys[0][:, rows]

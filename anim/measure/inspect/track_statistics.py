@@ -12,7 +12,7 @@ from anim.maths import hermite, quaternion
 from anim.measure.inspect.redundant_keys import redundant_keys
 from anim.model import Interpolation, Skeleton, Track, ValueKind
 from anim.model.track import BYTE_UNIT_TOLERANCE
-from anim.sampling.batch import ConcatenatedTracks, concatenate
+from anim.sampling.batch import ConcatenatedTracks, concatenate, iterate_concatenated
 
 FLOAT32_TOLERANCE = 2.0**-22  # relative; twice the spacing of float32: values closer than this are equal
 KEY_TOLERANCE_PER_RANGE = 1e-6  # fraction of a track's range: tolerance of interpolated keys
@@ -72,15 +72,15 @@ def non_unit_keys(tracks: Sequence[Track]) -> list[int]:
     """Return the number of rotation keys of each track that are not of unit length within rounding."""
     found = [0] * len(tracks)
     turning = [i for i, track in enumerate(tracks) if track.kind is ValueKind.ROTATION]
-    if not turning:
-        return found
-    chosen = [tracks[i] for i in turning]
-    counts = [len(track.times) for track in chosen]
-    values = np.concatenate([track.values for track in chosen])
-    off = _unit_error(np.sqrt(quaternion.dot(values, values)), chosen, counts)
-    for i, sum_of_track in zip(turning, np.add.reduceat(off, np.cumsum([0, *counts[:-1]]), dtype=int), strict=True):
-        found[i] = int(sum_of_track)
+    for group in iterate_concatenated([tracks[i] for i in turning]):
+        off = _unit_error(_lengths(group), group.tracks, group.counts)
+        for i, count in zip(group.numbers.tolist(), _sums(group, off).tolist(), strict=True):
+            found[turning[i]] = count
     return found
+
+
+def _lengths(group: ConcatenatedTracks) -> Floats:
+    return np.asarray(np.sqrt(quaternion.dot(group.values, group.values)))
 
 
 def _unit_error(lengths: Floats, tracks: Sequence[Track], counts: Ints | list[int]) -> Bools:
@@ -120,7 +120,7 @@ def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, gi
 
 def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:
     """The rotations (S, 4) at unit length with aligned signs; their counts are written into `result`."""
-    lengths = np.sqrt(quaternion.dot(group.values, group.values))
+    lengths = _lengths(group)
     values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
     dots = np.ones(len(values))  # of each key with the one before it; the first of a track has none
     dots[1:] = quaternion.dot(values[1:], values[:-1])

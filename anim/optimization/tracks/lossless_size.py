@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from hashlib import blake2b
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from anim.gltf.validation.buffer_layout import COMPONENT_SIZES
 from anim.model import FLOAT32, Interpolation, TimeAxis, Track
 from anim.optimization.tracks.key_reduction import INT16, are_exact_in_int16
 from anim.optimization.tracks.quantization import ByteCosts
+
+MAX_STACKED_VALUES = 1 << 20  # of tracks on one time axis, reduced at a time
 
 
 def min_lossless_bytes(tracks: Sequence[Track], stays: Sequence[bool], costs: ByteCosts) -> float:
@@ -26,23 +29,30 @@ def min_lossless_bytes(tracks: Sequence[Track], stays: Sequence[bool], costs: By
             key = track.time_axis, track.interpolation, track.values.shape[1]
             groups.setdefault(key, []).append((track, stay))
     sizes: dict[tuple[int, bytes], int] = {}
-    axes: set[bytes] = set()
+    axes: dict[bytes, float] = {}
     text = 0.0
-    for (axis, interpolation, _), group in groups.items():
-        values = np.array([track.values for track, _ in group])
-        is_constant, kept = _retained_keys(values, interpolation)
-        fits = are_exact_in_int16(values) & (interpolation is not Interpolation.CUBICSPLINE)
-        for (track, stay), constant, mask, fit in zip(group, is_constant.tolist(), kept, fits.tolist(), strict=True):
-            if constant:
-                text += costs.single_key * stay
-                continue
-            slim, parts = track.values[mask], 3 if interpolation is Interpolation.CUBICSPLINE else 1
-            storage = INT16 if fit and track.path == "rotation" and track.storage == FLOAT32 else track.storage
-            component = COMPONENT_SIZES[storage.component_type]
-            text += costs.track
-            sizes[component, slim.tobytes()] = parts * component * slim.size
-            axes.add(axis.times[mask].tobytes())
-    return text + sum(sizes.values()) + sum(costs.axis + 4 * len(each) // 8 for each in axes)
+    for (axis, interpolation, width), group in groups.items():
+        count = max(MAX_STACKED_VALUES // (len(axis) * width), 1)
+        for some in (group[first : first + count] for first in range(0, len(group), count)):
+            values = np.array([track.values for track, _ in some])
+            is_constant, kept = _retained_keys(values, interpolation)
+            fits = are_exact_in_int16(values) & (interpolation is not Interpolation.CUBICSPLINE)
+            for (track, stay), constant, mask, fit in zip(some, is_constant.tolist(), kept, fits.tolist(), strict=True):
+                if constant:
+                    text += costs.single_key * stay
+                    continue
+                slim, parts = track.values[mask], 3 if interpolation is Interpolation.CUBICSPLINE else 1
+                storage = INT16 if fit and track.path == "rotation" and track.storage == FLOAT32 else track.storage
+                component = COMPONENT_SIZES[storage.component_type]
+                text += costs.track
+                sizes[component, _digest(slim)] = parts * component * slim.size
+                times = axis.times[mask]
+                axes[_digest(times)] = costs.axis + 4 * len(times)
+    return text + sum(sizes.values()) + sum(axes.values())
+
+
+def _digest(values: Floats) -> bytes:
+    return blake2b(values.data, digest_size=16).digest()
 
 
 def _retained_keys(values: Floats, interpolation: Interpolation) -> tuple[Bools, Bools]:

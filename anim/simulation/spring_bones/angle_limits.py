@@ -48,9 +48,11 @@ class AngleLimit:
     def __post_init__(self) -> None:
         check_quantity(self.angle, "pitch" if self.shape is LimitShape.SPHERICAL else "angle", least=0.0)
         check_quantity(self.yaw, "yaw", least=0.0)
-        if not (np.isfinite(self.rotation).all() and np.linalg.norm(self.rotation)):
+        for name in ("angle", "yaw"):
+            object.__setattr__(self, name, float(getattr(self, name)))  # numpy has no type for the integers of JSON
+        x, y, z, w = map(float, self.rotation)
+        if not (np.isfinite((x, y, z, w)).all() and np.linalg.norm((x, y, z, w))):
             raise RangeError(f"rotation is {self.rotation} (expected a unit quaternion)")
-        x, y, z, w = map(float, self.rotation)  # squares of integers could overflow
         object.__setattr__(self, "rotation", (x, y, z, w))
 
 

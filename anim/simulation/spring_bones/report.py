@@ -133,4 +133,4 @@ def step_error(
     proof = largest_error(prover, result.clip, half.clip)
     common = min(len(result.tails), len(half.tails[::2]))  # the last step may begin before the end, and end after it
     apart = result.tails[:common] - half.tails[::2][:common]
-    return max(proof.error.max_error, proof.bound or 0.0, float(np.sqrt((apart * apart).sum(axis=-1)).max()))
+    return max(proof.error.max_error, proof.bound or 0.0, float(np.sqrt((apart * apart).sum(axis=-1)).max(initial=0.0)))

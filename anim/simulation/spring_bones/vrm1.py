@@ -71,7 +71,7 @@ def _chain(spring: Json, groups: list[tuple[int, ...]]) -> SpringChain:
 
 
 def _parameters(joint: Json) -> SpringParameters:
-    power, direction = joint.get("gravityPower", 0.0), joint.get("gravityDir", DOWN)
+    power, direction = float(joint.get("gravityPower", 0.0)), joint.get("gravityDir", DOWN)  # integers don't overflow
     return SpringParameters(
         stiffness=joint.get("stiffness", DEFAULT_STIFFNESS),
         drag=joint.get("dragForce", DEFAULT_DRAG),

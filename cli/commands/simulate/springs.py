@@ -156,7 +156,7 @@ def command(
             reporter.info(f"note: {note}")
         prover = Prover(ErrorMetric(scene)) if max_error is not None or report is not None else None
         error = depth = None
-        if prover is not None and report is not None:
+        if prover is not None and report is not None and result.joints:  # all can be without length
             error = step_error(prover, scene.skeleton, driver, bones, options, result)
             depth = deepest_penetration(scene.skeleton, result.clip, bones, _key_times(result))
         reduced = ""

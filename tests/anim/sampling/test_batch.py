@@ -9,7 +9,8 @@ import pytest
 
 from anim.model import TimeAxis
 from anim.sampling import batch as module
-from anim.sampling.batch import batches, concatenate
+from anim.sampling.batch import concatenate
+from anim.sampling.lazy_batch import batches
 from anim.sampling.players import PLAYERS, sampler
 from anim.sampling.track import find_interval, sample
 from tests import clips

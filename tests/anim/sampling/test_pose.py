@@ -13,12 +13,13 @@ from anim.arrays import Floats
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError
 from anim.gltf.reading import reader
 from anim.model import Clip, Skeleton, TimeAxis
-from anim.sampling import rest_pose, sample_pose, world_matrices
-from anim.sampling.batch import lazy_batches
+from anim.sampling import lazy_batch, rest_pose, sample_pose, world_matrices
+from anim.sampling.batch import Batch
 from anim.sampling.clips import sample_world_matrices
+from anim.sampling.lazy_batch import LazyBatch, lazy_batches
 from anim.sampling.players import PLAYERS, sampler
 from anim.sampling.pose import PoseSampler
-from anim.sampling.track import find_interval, sample
+from anim.sampling.track import KeyInterval, find_interval, sample
 from fixtures.broken.pieces import text
 from tests.clips import about, clip, skeleton, track
 from tests.files import opened, opened_fixture
@@ -157,20 +158,42 @@ def test_stretches_of_time_are_the_whole(name: str) -> None:
                         assert np.array_equal(part.weights[node], weights[low : low + 7])
 
 
+def _stacked(stack: LazyBatch, at: Floats) -> tuple[Batch, KeyInterval]:
+    """The keys that a stack returns at times, and their intervals in these."""
+    place = find_interval(stack.time_axis.times, at)
+    batch, left, right = stack.at(place.left, place.right)
+    return batch, place._replace(left=left, right=right)
+
+
+def _two_lines(keys: int) -> LazyBatch:
+    """Two translations that are equal to the time, with a key per second."""
+    axis = TimeAxis(np.arange(keys))
+    values = np.tile(axis.times[:, None], 3)
+    (stack,) = lazy_batches([track("translation", axis, values, node=node) for node in (0, 1)])
+    return stack
+
+
 def test_keys_are_stacked_where_they_are_needed_and_all_in_the_end() -> None:
-    axis = TimeAxis(np.arange(100))
-    times = axis.times
-    moving = [track("translation", axis, np.tile(times[:, None], 3), node=node) for node in (0, 1)]
-    (stack,) = lazy_batches(moving)
+    stack = _two_lines(100)
     for low in range(0, 200, 10):
         at = np.linspace(low % 100 + 0.5, low % 100 + 3.5, 5)
-        batch, place = stack.at(find_interval(times, at))
+        batch, place = _stacked(stack, at)
         assert len(batch.times) == 5
         assert batch.sample(at, place)[:, 1, 2].tolist() == at.tolist()
-    seen = [len(stack.at(find_interval(times, np.array([low + 0.5])))[0].times) for low in range(60)]
+    seen = [len(_stacked(stack, np.array([low + 0.5]))[0].times) for low in range(60)]
     assert (seen[0], seen[-1]) == (2, 100)
-    (fresh,) = lazy_batches(moving)
-    assert len(fresh.at(find_interval(times, times[:60]))[0].times) == 100, "half of them at once"
+    assert len(_stacked(_two_lines(100), np.arange(60.0))[0].times) == 100, "half of them at once"
+
+
+def test_of_long_tracks_only_requested_keys_are_stacked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lazy_batch, "MAX_STACKED_KEYS", 199)
+    stack = _two_lines(100)
+    for _ in range(3):
+        for at, keys in ((np.linspace(0, 98.5, 198), 100), (np.linspace(20, 29.5, 9), 11), (np.array([3, 3.5, 90]), 4)):
+            batch, place = _stacked(stack, at)
+            assert len(batch.times) == keys
+            assert batch.sample(at, place)[:, 1, 2].tolist() == at.tolist()
+            assert batch.is_inside(at).all()
 
 
 def test_a_node_that_the_skeleton_lacks_is_refused() -> None:

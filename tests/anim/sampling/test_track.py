@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from anim.gltf.reading import reader
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling import track as sampling_track
-from anim.sampling.batch import batches
+from anim.sampling.lazy_batch import batches
 from anim.sampling.track import find_interval, sample
 from tests.clips import CUBICSPLINE, STEP, about, track
 from tests.files import opened_fixture

@@ -12,7 +12,7 @@ from anim.measure.continuous_bound.prover import PLAYER_ORDER
 from anim.measure.continuous_bound.rotation_endpoints import rotation_endpoints
 from anim.measure.error.sample_times import dense_times
 from anim.model import Clip, Interpolation, Track
-from anim.sampling.batch import batches
+from anim.sampling.lazy_batch import lazy_batches
 from anim.sampling.players import PLAYERS, sampler_for
 from tests.clips import CUBICSPLINE, LINEAR, STEP, clip, skeleton, track
 
@@ -71,7 +71,7 @@ def test_within_gaps_the_law_goes_on(seed: int) -> None:
 
 
 def _tracks(moving: Clip, where: Intervals) -> NodeTracks:
-    return NodeTracks(np.zeros(1, int), np.array([[0.0, 0, 0, 1]]), batches(moving.tracks), where)
+    return NodeTracks(np.zeros(1, int), np.array([[0.0, 0, 0, 1]]), lazy_batches(moving.tracks), where)
 
 
 def _same_side(found: Floats, expected: Floats) -> Floats:

@@ -12,7 +12,7 @@ from anim.measure.continuous_bound.endpoints import endpoints, slide_bounds
 from anim.measure.continuous_bound.intervals import Intervals
 from anim.measure.continuous_bound.node_tracks import NodeTracks
 from anim.model import Interpolation, Track
-from anim.sampling.batch import batches
+from anim.sampling.lazy_batch import lazy_batches
 from anim.sampling.track import sample
 from tests.clips import CUBICSPLINE, LINEAR, STEP, track
 
@@ -29,7 +29,7 @@ def _length(vectors: Floats) -> Floats:
 def test_one_sided_values_and_slopes(mode: Interpolation) -> None:
     """Against the track itself, a little inside both ends of each gap."""
     moving = _track(mode)
-    of = NodeTracks(np.array([7, 8]), np.zeros((2, 3)), batches([replace(moving, node=8)]), WHERE)
+    of = NodeTracks(np.array([7, 8]), np.zeros((2, 3)), lazy_batches([replace(moving, node=8)]), WHERE)
     found = endpoints([of])
     nothing, value, slope, bend = found.value[..., :4], *(each[..., 4:] for each in found)
     assert not nothing.any()
@@ -43,7 +43,7 @@ def test_one_sided_values_and_slopes(mode: Interpolation) -> None:
 @pytest.mark.parametrize("modes", [(LINEAR, LINEAR), (CUBICSPLINE, LINEAR), (CUBICSPLINE, CUBICSPLINE)])
 def test_bounds_of_slides(modes: tuple[Interpolation, Interpolation]) -> None:
     a, b = _track(modes[0]), _track(modes[1], 0.1)
-    both = [endpoints([NodeTracks(np.zeros(1, int), np.zeros((1, 3)), batches([each]), WHERE)]) for each in (a, b)]
+    both = [endpoints([NodeTracks(np.zeros(1, int), np.zeros((1, 3)), lazy_batches([each]), WHERE)]) for each in (a, b)]
     found = slide_bounds(both[0], both[1], WHERE.lengths, _length)
     for gap in range(len(WHERE)):
         t = np.linspace(WHERE.starts[gap], WHERE.ends[gap], 2001)[:-1]

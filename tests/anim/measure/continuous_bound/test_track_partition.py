@@ -8,7 +8,7 @@ import numpy as np
 
 from anim.measure.continuous_bound.track_partition import partition_tracks
 from anim.model import Scene
-from anim.sampling.batch import Batch
+from anim.sampling.lazy_batch import LazyBatch
 from tests.clips import CUBICSPLINE, clip, skeleton, track
 
 OF = Scene(skeleton([-1, 0, 0]), ())
@@ -16,7 +16,7 @@ TIMES = [0.0, 1.0]
 SAME, OTHER = np.ones((2, 3)), np.array([[1.0, 1, 1], [2, 1, 1]])
 
 
-def _nodes(batches: Sequence[Batch]) -> set[tuple[int | None, str]]:
+def _nodes(batches: Sequence[LazyBatch]) -> set[tuple[int | None, str]]:
     return {(each.node, each.path) for batch in batches for each in batch.tracks}
 
 
@@ -26,7 +26,7 @@ def test_what_moves_in_one_version_moves_in_both() -> None:
     a, b = partition_tracks((OF, OF), (first, second))
     assert _nodes(a.moving) == _nodes(b.moving) == {(1, "scale")}
     assert _nodes(a.still) == _nodes(b.still) == {(0, "scale")}
-    assert all(len(batch.times) == len(batch.values) == 1 for batch in a.still)
+    assert all(len(batch.time_axis) == len(batch.whole.values) == 1 for batch in a.still)
 
 
 def test_a_cubic_of_equal_keys_moves_where_it_has_tangents() -> None:
@@ -34,8 +34,8 @@ def test_a_cubic_of_equal_keys_moves_where_it_has_tangents() -> None:
     both = [track("scale", TIMES, SAME, CUBICSPLINE, node=n, tangents=(t, t)) for n, t in ((0, zero), (1, some))]
     a, _ = partition_tracks((OF, OF), (clip(*both), clip(*both)))
     assert (_nodes(a.moving), _nodes(a.still)) == ({(1, "scale")}, {(0, "scale")})
-    assert a.still[0].tangents is not None
-    assert a.still[0].tangents[0].shape == (1, 1, 3)
+    assert a.still[0].whole.tangents is not None
+    assert a.still[0].whole.tangents[0].shape == (1, 1, 3)
 
 
 def test_tracks_of_nodes_that_are_not_there_are_left_out() -> None:
@@ -46,5 +46,5 @@ def test_tracks_of_nodes_that_are_not_there_are_left_out() -> None:
 def test_weights_by_their_number() -> None:
     first = clip(track("weights", TIMES, [[0, 1], [1, 1]], node=2), track("weights", TIMES, [[1], [1]], node=1))
     a, _ = partition_tracks((OF, OF), (first, first))
-    assert [batch.values.shape for batch in (*a.weights(2, 2), *a.weights(1, 1))] == [(2, 1, 2), (2, 1, 1)]
+    assert [batch.whole.values.shape for batch in (*a.weights(2, 2), *a.weights(1, 1))] == [(2, 1, 2), (2, 1, 1)]
     assert a.weights(2, 3) == a.weights(0, 2) == []
