@@ -66,6 +66,7 @@ def serve() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what native packages print
         function, arguments, limit_bytes = pickle.load(source)
         threading.Thread(target=_end_with, args=(source,), daemon=True).start()
+        _end_by_signal(source)
         try:
             with limit_allocations(limit_bytes):
                 for message in function(*arguments):
@@ -87,6 +88,20 @@ def _end_with(source: IO[bytes]) -> None:
     """Exit when the parent has closed its end of stdin, as the system does when it exits."""
     source.read(1)
     os._exit(1)
+
+
+def _end_by_signal(source: IO[bytes]) -> None:
+    """Let the system end this process when the other end of a pipe is closed: native code may never let threads run.
+
+    SIGIO is sent then, whose default is to end.
+    """
+    with suppress(ImportError, AttributeError, OSError):  # Windows has none of these
+        import fcntl
+        import signal
+
+        signal.signal(signal.SIGIO, signal.SIG_DFL)
+        fcntl.fcntl(source, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(source, fcntl.F_SETFL, fcntl.fcntl(source, fcntl.F_GETFL) | os.O_ASYNC)
 
 
 def _send(pipe: IO[bytes], data: bytes) -> None:

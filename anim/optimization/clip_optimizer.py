@@ -222,7 +222,7 @@ def _optimize(optimizer: ClipOptimizer, number: int, task: Task) -> Optimizing[C
     """Optimize one clip: yields its searches and verifications, of which it takes the results."""
     context = optimizer.context()
     found = []
-    for effort in context.effort.all():
+    for effort in context.effort.all() if context.is_measurable else ():
         each = yield from _search_within_bounds(optimizer, number, task, effort)
         if each is not None:
             found.append(each)

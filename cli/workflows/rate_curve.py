@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Sequence
 from pathlib import PurePath
 
 import numpy as np
 
+from anim.errors import FormatError
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, RatePoint, curve
 from anim.units import format_number
@@ -28,6 +30,10 @@ def check_curve_file(path: str) -> None:
 
 def write_curve(work: OptimizeJob, request: Request, path: str, reporter: Reporter, *, dry_run: bool) -> None:
     """Search with one bound after another, report each size, and write the curve."""
+    if not math.isfinite(work.scale):
+        raise FormatError(
+            "nodes are too far apart for an error in percent of the model's size (its diagonal is infinite)"
+        )
     points = []
     bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
     for point in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):

@@ -24,7 +24,8 @@ T = TypeVar("T")
 def package() -> tuple[Any, Any, Any]:
     """Return usd-core's Usd, UsdGeom and Vt. Raises UnsupportedError if it is not installed."""
     try:
-        from pxr import Usd, UsdGeom, Vt
+        with hold_signals():  # what a signal raises while these load is lost, or leaves half of them
+            from pxr import Gf, Tf, Usd, UsdGeom, UsdSkel, Vt  # noqa: F401
     except ImportError:
         raise UnsupportedError("USD needs the package usd-core", help="pip install 'gltf-anim[usd]'") from None
     return Usd, UsdGeom, Vt

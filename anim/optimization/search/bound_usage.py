@@ -22,6 +22,7 @@ MAX_BLOCK_MATRICES = 100_000  # world matrices of nodes at a time: 10 MB; more a
 MIN_BLOCK_TIMES = 64
 # A clip is measured in float32, in half the time, where its bounds are this many rounding errors of its positions.
 MIN_ROUNDINGS = 4000
+MAX_SINGLE_M = 1e15  # squares of larger coordinates could overflow in float32
 PROBE_TIMES = 8  # of a clip, at which the nodes between the roots and the points are looked at
 
 
@@ -101,7 +102,8 @@ class BoundUsage:
         smallest = self._allowed.min(axis=0, initial=np.inf)
         if self._bounds.max_speed_error is not None:
             smallest = np.minimum(smallest, self._bounds.max_speed_error * MIN_INTERVAL_S)
-        return np.asarray(smallest >= MIN_ROUNDINGS * np.finfo(np.float32).eps * reach)
+        is_above_rounding = smallest >= MIN_ROUNDINGS * np.finfo(np.float32).eps * reach
+        return np.asarray(is_above_rounding & (reach < MAX_SINGLE_M))
 
     def _farthest_nodes(self) -> Floats:
         """The largest coordinate (B,) of the nodes above points, in m: of a far parent the point may be near again."""

@@ -21,6 +21,8 @@ from anim.optimization.tracks.quantization import Encoding
 from anim.sampling.pose import rest_world
 from anim.sampling.weight_pointers import moved_nodes
 
+MAX_COORDINATE_M = 1e15
+
 
 @dataclass(frozen=True, slots=True)
 class Context:
@@ -42,6 +44,12 @@ class Context:
     policy: Policy
     coding: Encoding
     effort: Effort
+
+    @property
+    def is_measurable(self) -> bool:
+        """Whether bounds are finite, and all coordinates small enough for their squares in float32."""
+        most = max(np.abs(part).max(initial=0.0) for part in (self.rest_world, self.points.factors))
+        return bool(most < MAX_COORDINATE_M) and bool(np.isfinite((self.size, self.bounds.max_error)).all())
 
     def morph_reach(self, node: int) -> Floats:
         """Return the displacement (M, V), m, of each vertex by each morph target of a node at weight 1."""

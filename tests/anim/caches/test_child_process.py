@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,13 @@ def endless(path: str) -> Iterator[int]:
     Path(path).touch()
     while True:
         pass
+
+
+def native(path: str) -> Iterator[int]:
+    """Like `endless`, in a loop that never lets another thread run."""
+    yield os.getpid()
+    Path(path).touch()
+    sum(itertools.repeat(0))
 
 
 def modules() -> Iterator[list[str]]:
@@ -101,29 +109,35 @@ def test_memory_has_a_limit() -> None:
 PARENT = """
 import sys
 from anim.caches.child_process import run_in_child
-from tests.anim.caches.test_child_process import endless
-with run_in_child(endless, sys.argv[1], limit_bytes=10**9) as messages:
+from tests.anim.caches import test_child_process
+with run_in_child(getattr(test_child_process, sys.argv[1]), sys.argv[2], limit_bytes=10**9) as messages:
     print(next(messages), flush=True)
     sys.stdin.read()
 """
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are found in /proc")
-def test_the_child_ends_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("work", ["endless", "native"])
+def test_the_child_ends_with_a_parent_that_is_killed(work: str, tmp_path: Path) -> None:
     parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(tmp_path / "a")],
+        [sys.executable, "-c", PARENT, work, str(tmp_path / "a")],
         cwd=Path(__file__).parents[3],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
     assert parent.stdout is not None
     child = int(parent.stdout.readline())
+    wait_until((tmp_path / "a").exists)
     parent.kill()
     parent.communicate()
+    wait_until(lambda: not is_running(child))
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
     end = time.monotonic() + 120
-    while is_running(child) and time.monotonic() < end:
+    while not holds():
+        assert time.monotonic() < end
         time.sleep(0.05)
-    assert not is_running(child)
 
 
 def is_running(number: int) -> bool:

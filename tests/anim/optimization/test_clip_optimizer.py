@@ -75,6 +75,14 @@ def test_what_never_holds_is_kept_without_loss(monkeypatch: pytest.MonkeyPatch) 
     assert found.verdict.error.max_error <= 1e-9
 
 
+@pytest.mark.parametrize("scale", [1e18, 1e30])
+def test_coordinates_beyond_float32_are_kept_without_loss(scale: float) -> None:
+    far = replace(OF, skeleton=replace(OF.skeleton, scale=OF.skeleton.scale * scale))
+    request = Request(Bounds(BOUND * scale, 0.02), effort="fast")
+    found = _optimized(ClipOptimizer(request, far, far, (waving(),)), _task(1))
+    assert found.without_loss
+
+
 @pytest.mark.parametrize(("bytes_at_least", "searches"), [(1e9, [BOUND]), (0.0, [BOUND, 0.0])])
 def test_no_search_without_loss_that_cannot_be_smaller(
     bytes_at_least: float, searches: list[float], monkeypatch: pytest.MonkeyPatch
