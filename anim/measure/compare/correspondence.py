@@ -116,6 +116,7 @@ class _SceneMatcher:
         for each in self._new:
             self._below_node.setdefault(int(other.skeleton.parents[each.node]), []).append(each)
         self._local = local_by_node(scene.skeleton, rest_pose(scene.skeleton))[:, 0]
+        self._places: dict[int, tuple[int, Floats]] = {}  # of nodes that the other scene lacks, as they are asked for
 
     def partner(self, number: int, instance: MeshInstance) -> MeshInstance | None:
         """The instance of the other scene with the same vertices: same node, same name, same order."""
@@ -233,11 +234,15 @@ class _SceneMatcher:
 
     def _place(self, node: int) -> tuple[int, Floats]:
         """The other scene's node for a node, −1 for the world, and the transform between them at rest."""
-        local: Floats = mesh_space.IDENTITY
-        while node >= 0 and self.nodes[node] < 0:
-            local = matrix.multiply(self._local[node], local)
+        path = []
+        while node >= 0 and self.nodes[node] < 0 and node not in self._places:
+            path.append(node)
             node = int(self._scene.skeleton.parents[node])
-        return (int(self.nodes[node]) if node >= 0 else -1), local
+        there, local = self._places.get(node) or (int(self.nodes[node]) if node >= 0 else -1, mesh_space.IDENTITY)
+        for each in reversed(path):
+            local = matrix.multiply(local, self._local[each])
+            self._places[each] = there, local
+        return there, local
 
     def _below(self, instance: MeshInstance) -> MeshInstance | None:
         """The only instance on a child of an instance's partner node: other tools put meshes there."""
