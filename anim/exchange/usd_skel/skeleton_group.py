@@ -18,6 +18,8 @@ from anim.exchange.usd_skel.joint_hierarchy import NodeOrder, join_joints
 from anim.model import MeshInstance, Scene, Skin
 from anim.sampling.pose import rest_world
 
+MAX_JOINTS = 200_000  # of all skeletons, about 30 µs each
+
 
 @dataclass(slots=True)
 class SkeletonGroup:
@@ -58,7 +60,7 @@ def group_skeletons(
 
     Unskinned instances below joints are members too, bound to their own node: players move skeletons more reliably than
     prims. animated: nodes that a clip moves; those above joints become joints.
-    Raises UnsupportedError for a joint with weight whose inverse bind matrix has no inverse.
+    Raises UnsupportedError for a joint with weight whose inverse bind matrix has no inverse, and for too many joints.
     """
     rest = rest_world(scene.skeleton)
     groups: list[SkeletonGroup] = []
@@ -90,8 +92,15 @@ def group_skeletons(
         first = above[instance.node]
         if instance.skin is None and not len(instance.mesh.targets) and first is not None:
             _add_attached(groups[first], instance, rest)
+    num_joints = 0
     for group in groups:
         group.anchor, group.joints, group.parents = join_joints(group.inverse_bind, order, animated)
+        num_joints += len(group.joints)
+        if num_joints > MAX_JOINTS:
+            raise UnsupportedError(
+                f"its skeletons have more than {MAX_JOINTS} joints in USD: each has those above its own that move, too",
+                help="bake to .usdz has their vertices",
+            )
     return groups + morphed
 
 

@@ -14,6 +14,7 @@ from anim.caches.options import ReadOptions
 from anim.caches.registry import reader_for
 from anim.caches.storage import Memory
 from anim.errors import NotFoundError, UnsupportedError
+from anim.exchange.usd_skel import skeleton_group
 from anim.exchange.usd_skel.sample_times import sample_times
 from anim.exchange.usd_skel.stage import StageTimes
 from anim.exchange.usd_skel.write import UsdSkelResult, write
@@ -259,6 +260,13 @@ def test_refusals(tmp_path: Path) -> None:
         written(document, Scene(scene.skeleton, (flat,)), clip, tmp_path)
     with pytest.raises(NotFoundError, match="no mesh with faces"):
         written(document, Scene(scene.skeleton, ()), clip, tmp_path)
+
+
+def test_all_joints_have_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    document, scene, _ = arm()
+    monkeypatch.setattr(skeleton_group, "MAX_JOINTS", 1)
+    with pytest.raises(UnsupportedError, match="more than 1 joints in USD"):
+        written(document, scene, NO_CLIP, tmp_path)
 
 
 def test_steps_are_steep(tmp_path: Path) -> None:
