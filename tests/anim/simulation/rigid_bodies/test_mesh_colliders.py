@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -62,9 +64,14 @@ def test_all_meshes_of_a_scene_have_a_limit(monkeypatch: pytest.MonkeyPatch) -> 
 
 @needs_rapier
 def test_bodies_of_one_mesh_share_its_hull(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
+    asked: list[Any] = []
     hull = ShapeBuilder._hull
-    monkeypatch.setattr(ShapeBuilder, "_hull", lambda *args: asked.append(1) or hull(*args))
+
+    def count(*args: Any) -> Any:
+        asked.append(args)
+        return hull(*args)
+
+    monkeypatch.setattr(ShapeBuilder, "_hull", count)
     shape = Shape("hull", points=CORNERS)
     motion = run(*(body(shape, (2 * i, 0, 0)) for i in range(5)), seconds=0.1)
     assert len(asked) == 1
