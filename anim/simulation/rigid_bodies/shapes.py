@@ -73,7 +73,11 @@ class ScaledShapes:
         self._made: dict[tuple[Shape, bytes], Shape] = {}
 
     def scale(self, shape: Shape, linear: Floats) -> Shape:
-        """Return the shape under a scale (3, 3), or of one that differs by less than SAME_SCALE."""
+        """Return the shape under a scale (3, 3); of points, under one that differs by less than SAME_SCALE."""
+        if shape.kind not in ("hull", "mesh"):
+            return scale_shape(shape, linear)
+        if np.abs(linear - np.eye(3)).max() < SAME_SCALE:
+            return shape
         size = float(f"{np.abs(linear).max():.9g}")
         key = shape, np.append(np.round(linear / size / SAME_SCALE) + 0.0, size).tobytes()  # no negative zeros
         if key not in self._made:

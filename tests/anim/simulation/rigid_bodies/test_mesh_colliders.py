@@ -86,3 +86,4 @@ def test_scales_that_differ_by_rounding_give_one_shape() -> None:
     assert made.scale(shape, 0.7001 * np.eye(3)) is not first
     assert made.scale(shape, -0.7 * np.eye(3)) is not first
     assert made.scale(Shape("hull", points=CORNERS), 0.7 * np.eye(3)) is not first
+    assert made.scale(shape, np.eye(3) + 1e-16) is shape
