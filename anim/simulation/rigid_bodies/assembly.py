@@ -21,7 +21,7 @@ from anim.simulation.rigid_bodies.rigid_scene import (
     RigidJoint,
     RigidScene,
 )
-from anim.simulation.rigid_bodies.shapes import bounding_radius, scale_shape
+from anim.simulation.rigid_bodies.shapes import ScaledShapes, bounding_radius
 
 REST = Motion()
 ZERO: Floats = np.zeros(3)
@@ -44,15 +44,15 @@ def assemble(
     owned = _colliders_by_owner(description, skeleton)
     positions, rotations, _, _ = matrix.decompose(world)
     frames = [Frame(*each) for each in zip(positions, rotations, strict=True)]
-    bodies = []
+    bodies, shapes = [], ScaledShapes()
     for node, motion in description.motions.items():
         own = owned.get(node, [])
         kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
         kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
-        bodies.append(_body(node, kind, motion, own, description, skeleton, frames, world))
+        bodies.append(_body(node, kind, motion, own, description, skeleton, frames, world, shapes))
     for node in owned.get(-1, []):
         kind = BodyKind.ANIMATED if is_tracked[node] else BodyKind.STATIC
-        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames, world))
+        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames, world, shapes))
     indices = {body.node: i for i, body in enumerate(bodies)}
     joints = tuple(_joints(description, skeleton, indices, frames))
     if description.floor is not None:
@@ -93,11 +93,12 @@ def _body(
     skeleton: Skeleton,
     frames: Sequence[Frame],
     world: Floats,
+    shapes: ScaledShapes,
 ) -> RigidBody:
     made, frame = [], frames[node]
     for each in colliders:
         try:
-            made += _collider(each, description.colliders[each], frame, frames[each], world[each])
+            made += _collider(each, description.colliders[each], frame, frames[each], world[each], shapes)
         except AnimError as error:
             raise error.at(skeleton.label(each)) from None
     reach = [float(np.linalg.norm(each.frame.position)) + bounding_radius(each.shape) for each in made]
@@ -107,12 +108,14 @@ def _body(
     return RigidBody(node, kind, frame, tuple(made), motion, velocity, spin, max(reach, default=0.0))
 
 
-def _collider(node: int, collider: Collider, body: Frame, own: Frame, world: Floats) -> list[BodyCollider]:
+def _collider(
+    node: int, collider: Collider, body: Frame, own: Frame, world: Floats, shapes: ScaledShapes
+) -> list[BodyCollider]:
     """One collider in its body's frame; none for a scale of 0, which disables it."""
     linear = quaternion.to_matrix(quaternion.conjugate(own.rotation)) @ world[:, :3]
     if not np.linalg.norm(linear, axis=0).any():
         return []
-    shape: Shape = scale_shape(collider.shape, linear)
+    shape = shapes.scale(collider.shape, linear)
     return [BodyCollider(node, shape, relative_frame(body, own), collider.material, collider.filter)]
 
 

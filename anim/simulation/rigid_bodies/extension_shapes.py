@@ -36,6 +36,8 @@ class ShapeReader:
         self._shapes = shapes
         self._defaults = defaults
         self._local = local_by_node(skeleton, rest_pose(skeleton))[:, 0]
+        self._of_meshes: dict[tuple[int, str, tuple[float, ...] | None], Shape] = {}
+        self._of_nodes: dict[tuple[int, str], Shape] = {}
 
     def shape(self, index: Any) -> Shape:
         """Return a shape of the array by index. Raises FormatError, RangeError or UnsupportedError."""
@@ -57,20 +59,26 @@ class ShapeReader:
         raise UnsupportedError(f"shape {index} is a '{kind}' (known: sphere, box, capsule, cylinder, plane, meshes)")
 
     def mesh(self, index: Any, kind: str, weights: Any = None) -> Shape:
-        """Return the "mesh" or "hull" of a mesh by index. weights: of its morph targets."""
+        """Return the "mesh" or "hull" of a mesh by index, the same object again. weights: of its morph targets."""
         read_item(json_array(self._document.json, "meshes"), index, "mesh")
         mesh = self._meshes.mesh(index, joint_count=0)
         own = read_numbers({"weights": weights}, "weights", len(mesh.rest_weights))
-        return mesh_shape(mesh, kind, None if own is None else np.array(own))
+        key = index, kind, own
+        if key not in self._of_meshes:
+            self._of_meshes[key] = mesh_shape(mesh, kind, None if own is None else np.array(own))
+        return self._of_meshes[key]
 
     def node_meshes(self, node: Any, kind: str) -> Shape:
         """Return the "mesh" or "hull" of the meshes of a node and its descendants, in the node's space."""
         read_item(json_array(self._document.json, "nodes"), node, "node")
-        found = self._collect(int(node))
-        if not found:
-            raise FormatError(f"node {node} has no mesh to collide with")
-        joined = join_meshes(found)
-        return joined if kind == "mesh" else Shape("hull", points=joined.points[np.unique(joined.faces)])
+        if (node, kind) not in self._of_nodes:
+            found = self._collect(int(node))
+            if not found:
+                raise FormatError(f"node {node} has no mesh to collide with")
+            joined = join_meshes(found)
+            hull = Shape("hull", points=joined.points[np.unique(joined.faces)]) if kind == "hull" else joined
+            self._of_nodes[node, kind] = hull
+        return self._of_nodes[node, kind]
 
     def _collect(self, root: int) -> list[Shape]:
         """Shapes of the meshes on a node and below, depth first, in the node's space."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from anim.arrays import Floats
 from anim.maths import quaternion
 from anim.simulation.rigid_bodies.description import Shape
 from anim.simulation.rigid_bodies.rigid_scene import RigidBody, RigidScene
-from anim.simulation.rigid_bodies.shapes import bounding_radius
+from anim.simulation.rigid_bodies.shapes import NUM_SHARED, bounding_radius
 
 
 class BoundingSphere(NamedTuple):
@@ -20,6 +21,7 @@ class BoundingSphere(NamedTuple):
     radius: float
 
 
+@lru_cache(NUM_SHARED)
 def shape_extent(shape: Shape) -> BoundingSphere:
     """Return a sphere around a shape, in its collider's frame; of points, around the middle of their box."""
     center: Floats = np.array(shape.center)

@@ -10,7 +10,7 @@ import numpy as np
 from anim.arrays import Ints
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnsupportedError
 from anim.maths import hierarchy
-from anim.model import MeshInstance, Scene
+from anim.model import Mesh, MeshInstance, Scene
 from anim.model.skeleton import nearest_at_or_above, node_mask
 from anim.simulation.rigid_bodies.description import Collider, Material, Motion, PhysicsDescription, Shape
 from anim.simulation.rigid_bodies.shapes import mesh_shape
@@ -39,6 +39,7 @@ def add_chosen(description: PhysicsDescription, scene: Scene, chosen: ChosenNode
     colliders = dict(description.colliders)
     meshes = _MeshNodes(scene, motions)
     instances = {each.node: each for each in reversed(scene.instances)}
+    shapes: dict[tuple[Mesh, str, bytes], Shape] = {}  # bodies with the same mesh share its hull
     for nodes, kind in ((chosen.bodies, chosen.shape), (chosen.colliders, "mesh")):
         for node in nodes:
             below = meshes.of(node)
@@ -46,7 +47,11 @@ def add_chosen(description: PhysicsDescription, scene: Scene, chosen: ChosenNode
                 raise NotFoundError(f"{scene.skeleton.label(node)} has no mesh to collide with")
             for each in below:
                 if each not in colliders:
-                    colliders[each] = Collider(_shape(scene, instances[each], kind), chosen.material)
+                    own = instances[each]
+                    key = own.mesh, kind, own.weights.tobytes()
+                    if key not in shapes or own.skin is not None:
+                        shapes[key] = _shape(scene, own, kind)
+                    colliders[each] = Collider(shapes[key], chosen.material)
     return replace(description, motions=motions, colliders=colliders)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from anim.arrays import Floats
@@ -9,6 +11,8 @@ from anim.model import Mesh
 from anim.simulation.rigid_bodies.description import Shape
 
 SCALE_TOLERANCE = 1e-4  # relative difference of scales that counts as none: float32 rounding
+SAME_SCALE = 1e-9  # relative difference of scales that is rounding of rotations
+NUM_SHARED = 64  # shapes of many bodies whose extents are kept
 CIRCLE_POINTS, ARC_POINTS = 32, 7
 
 
@@ -62,6 +66,25 @@ def scale_shape(shape: Shape, linear: Floats) -> Shape:
     return Shape(shape.kind, tuple((np.array(shape.size) * factors).tolist()), center=(x, y, z))
 
 
+class ScaledShapes:
+    """Shapes under scales: one object for one shape and scale, so that instances of a mesh share points and hull."""
+
+    def __init__(self) -> None:
+        self._made: dict[tuple[Shape, bytes], Shape] = {}
+
+    def scale(self, shape: Shape, linear: Floats) -> Shape:
+        """Return the shape under a scale (3, 3); of points, under one that differs by less than SAME_SCALE."""
+        if shape.kind not in ("hull", "mesh"):
+            return scale_shape(shape, linear)
+        if np.abs(linear - np.eye(3)).max() < SAME_SCALE:
+            return shape
+        size = float(f"{np.abs(linear).max():.9g}")
+        key = shape, np.append(np.round(linear / size / SAME_SCALE) + 0.0, size).tobytes()  # no negative zeros
+        if key not in self._made:
+            self._made[key] = scale_shape(shape, linear)
+        return self._made[key]
+
+
 def surface_points(shape: Shape) -> Floats:
     """Return points (V, 3) of a sphere, capsule or cylinder of any radii, whose hull is the shape."""
     if shape.kind == "cylinder":
@@ -75,6 +98,7 @@ def surface_points(shape: Shape) -> Floats:
     return np.concatenate(rings)
 
 
+@lru_cache(NUM_SHARED)
 def bounding_radius(shape: Shape) -> float:
     """Return the largest distance of a shape's points from the origin of its collider, in metres."""
     offset = float(np.linalg.norm(shape.center))

@@ -26,6 +26,7 @@ from anim.simulation.rigid_bodies.motion import Recorder, RigidMotion, run_scene
 from anim.simulation.rigid_bodies.notes import find_notes
 from anim.simulation.rigid_bodies.omi_reader import read_omi
 from anim.simulation.rigid_bodies.options import RigidOptions
+from anim.simulation.rigid_bodies.overlaps import check_overlaps
 from anim.simulation.rigid_bodies.report import make_report
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from anim.simulation.steps import Steps
@@ -53,7 +54,7 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     """Return the tracks of all bodies, from the start of the clip on.
 
     Raises UnstableError with a report for a run that diverges, RangeError without a body, or for a loop of bodies that
-    nothing moves again, UnsupportedError for more steps than the limit of memory allows.
+    nothing moves again, UnsupportedError for more steps than the limit of memory allows, or bodies in each other.
     """
     skeleton, start = scene.skeleton, clip.start
     clip = Clip(clip.name, tuple(shift_time(track, -start) for track in clip.tracks))
@@ -66,6 +67,7 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
             "`loop` needs a clip or motor that moves bodies: those that only fall don't come back",
             help=("leave it out: players repeat any clip"),
         )
+    check_overlaps(rigid)
     rounds = MAX_ROUNDS if options.loop else 1
     count = len(rigid.moving)
     sizes = {"step_bytes": STEP_BYTES * count, "frame_bytes": FRAME_BYTES * count}

@@ -1,6 +1,7 @@
 """Collisions of tails with colliders, for many joints at once.
 
-Each joint meets its colliders one after another, in their order: round k holds the k-th collider of every joint.
+Each joint meets its colliders one after another, in their order. Collisions are rare: a block of many pairs of joint
+and collider is evaluated at once, and after a collision the later colliders of the joint again.
 Source: VRMC_springBone 1.0 and VRMC_springBone_extended_collider 1.0, reference implementations.
 """
 
@@ -14,19 +15,28 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 
+BLOCK_PAIRS = 512  # take as long as one pair, nearly
 TINY = 1e-300  # a divisor for vectors without length, so that their direction is 0
 
 
 @dataclass(frozen=True, slots=True)
-class _Round:
-    """One collider for each of R joints: joint (R,), row of the collider's table (R,), and its constants (R, 1)."""
+class _Pairs:
+    """P pairs of a joint (P,) and one of its colliders, by `place` (P,) of this in the joint's order, and then joint.
+
+    row: (P,) of the collider's table. Constants are (P, 1).
+    """
 
     joint: Ints
+    place: Ints
     row: Ints
     radius: Floats
     hit_radius: Floats
     side: Floats  # 1 outside, −1 inside
     is_plane: Bools
+
+    def __getitem__(self, kept: slice | Bools) -> _Pairs:
+        constants = self.radius[kept], self.hit_radius[kept], self.side[kept], self.is_plane[kept]
+        return _Pairs(self.joint[kept], self.place[kept], self.row[kept], *constants)
 
 
 class Collisions:
@@ -46,16 +56,16 @@ class Collisions:
         self._points = np.zeros((len(table), 4, 2))  # offset as a point; from it to the tail as a direction
         self._normals = np.zeros((len(table), 3))
         self._points[:, 3, 0] = 1
+        self._points[:, :3, 0] = [each.offset for each in table]
         for i, each in enumerate(table):
-            self._points[i, :3, 0] = each.offset
             if each.shape is ColliderShape.CAPSULE:
                 self._points[i, :3, 1] = np.subtract(each.tail, each.offset)
             if each.shape is ColliderShape.PLANE:
                 self._normals[i] = each.normal
         self._planes = np.flatnonzero(self._normals.any(axis=1))
-        position = {index: i for i, index in enumerate(used)}
-        own = [[position[index] for index in each] for each in chosen]
-        self._rounds = [_round(table, own, hit_radius, k) for k in range(max(map(len, chosen)))]
+        pairs = _pairs(table, used, chosen, hit_radius)
+        cuts = range(0, len(pairs.joint), BLOCK_PAIRS)
+        self._blocks = [pairs[cut : cut + BLOCK_PAIRS] for cut in cuts]
 
     def resolve(
         self,
@@ -72,16 +82,22 @@ class Collisions:
         matrices = world[self._nodes]
         points = np.matmul(matrices, self._points)
         normals = self._world_normals(matrices)
-        for each in self._rounds:
-            own = tail[each.joint]
-            direction, distance = _separation(each, own, points[each.row], normals[each.row] if len(normals) else None)
-            hit = distance[:, 0] < 0
-            if hit.any():
-                joint = each.joint[hit]
-                moved = own[hit] - direction[hit] * distance[hit] - head[joint]
+        for pairs in self._blocks:
+            while len(pairs.joint):
+                planes = normals[pairs.row] if len(normals) else None
+                direction, distance = _separation(pairs, tail[pairs.joint], points[pairs.row], planes)
+                hits = np.flatnonzero(distance[:, 0] < 0)
+                if not len(hits):
+                    break
+                joint, first = np.unique(pairs.joint[hits], return_index=True)
+                hit = hits[first]
+                moved = tail[joint] - direction[hit] * distance[hit] - head[joint]
                 tail = tail.copy()
                 tail[joint] = head[joint] + moved * (length[joint] / np.maximum(norms(moved), TINY))
                 tail = tail if limit is None else limit(tail)
+                met = np.full(len(tail), np.iinfo(np.int64).max)
+                met[joint] = pairs.place[hit]
+                pairs = pairs[pairs.place > met[pairs.joint]]
         return np.asarray(tail)
 
     def _world_normals(self, matrices: Floats) -> Floats:
@@ -96,22 +112,24 @@ class Collisions:
         return normals
 
 
-def _round(table: Sequence[Collider], own: Sequence[Sequence[int]], hit_radius: Floats, k: int) -> _Round:
-    """The k-th collider of every joint that has so many. own: for each joint the rows of its colliders in `table`."""
-    joints = np.array([i for i, each in enumerate(own) if len(each) > k])
-    rows = np.array([each[k] for each in own if len(each) > k])
-    met = [table[row] for row in rows]
-    return _Round(
-        joints,
-        rows,
-        np.array([[each.radius] for each in met]),
-        hit_radius[joints][:, None],
-        np.array([[-1.0 if each.inside else 1.0] for each in met]),
-        np.array([[each.shape is ColliderShape.PLANE] for each in met]),
-    )
+def _pairs(
+    table: Sequence[Collider], used: Sequence[int], chosen: Sequence[Sequence[int]], hit_radius: Floats
+) -> _Pairs:
+    """All pairs of a joint and a collider of `table`. used: indices of its colliders."""
+    counts = np.array([len(each) for each in chosen])
+    joint = np.repeat(np.arange(len(chosen)), counts)
+    place = np.arange(len(joint)) - np.repeat(np.cumsum(counts) - counts, counts)
+    row = np.searchsorted(used, np.concatenate([np.asarray(each, np.int64) for each in chosen]))
+    order = np.lexsort((joint, place))
+    joint, place, row = joint[order], place[order], row[order]
+    radius = np.array([each.radius for each in table])
+    side = np.array([-1.0 if each.inside else 1.0 for each in table])
+    is_plane = np.array([each.shape is ColliderShape.PLANE for each in table])
+    constants = radius[row][:, None], hit_radius[joint][:, None], side[row][:, None], is_plane[row][:, None]
+    return _Pairs(joint, place, row, *constants)
 
 
-def _separation(each: _Round, tail: Floats, points: Floats, normals: Floats | None) -> tuple[Floats, Floats]:
+def _separation(each: _Pairs, tail: Floats, points: Floats, normals: Floats | None) -> tuple[Floats, Floats]:
     """Unit directions (R, 3) away from the colliders, and distances (R, 1), negative in a collision."""
     delta = tail - points[..., 0]
     along = points[..., 1]

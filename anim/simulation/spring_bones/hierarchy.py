@@ -14,6 +14,7 @@ from anim.sampling import rest_world
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
 
 SCALE_TOLERANCE = 1e-3  # of a scale of 1
+MAX_TAIL_NODES = 32  # between a joint and its tail, which is mostly its child
 MIN_NOTED_ANGLE_DEG = 1.0  # between a bone as drawn and as simulated; less is hardly seen
 
 
@@ -22,16 +23,17 @@ def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
 
     Every node exists; a joint belongs to one chain, and its tail is one of its descendants; a center is the first joint
     or an ancestor of it; a collider is not moved by a joint that collides with it. Raises FormatError otherwise, and
-    UnsupportedError for a joint that `check_rotatable` refuses.
+    UnsupportedError for a joint that `check_rotatable` refuses, or whose tail is over MAX_TAIL_NODES below it.
     """
     owners: dict[int, int] = {}
     subtrees = hierarchy.find_subtrees(skeleton.parents)
+    depths = hierarchy.find_depths(skeleton.parents)
     for i, collider in enumerate(bones.colliders):
         if collider.node is not None:
             _check_node(skeleton, collider.node, f"collider {i}")
     for i, chain in enumerate(bones.chains):
         try:
-            _check_chain(skeleton, subtrees, bones, chain)
+            _check_chain(skeleton, subtrees, depths, bones, chain)
         except AnimError as error:
             raise error.at(chain_label(bones.chains, i)) from None
         for joint in chain.joints:
@@ -42,10 +44,12 @@ def check_hierarchy(skeleton: Skeleton, bones: SpringBones) -> None:
                 )
 
 
-def _check_chain(skeleton: Skeleton, subtrees: tuple[Ints, Ints], bones: SpringBones, chain: SpringChain) -> None:
+def _check_chain(
+    skeleton: Skeleton, subtrees: tuple[Ints, Ints], depths: Ints, bones: SpringBones, chain: SpringChain
+) -> None:
     seen: set[int] = set()
     for joint in chain.joints:
-        _check_joint(skeleton, subtrees, joint)
+        _check_joint(skeleton, subtrees, depths, joint)
         if joint.node in seen:
             raise FormatError(f"{skeleton.label(joint.node)} is a joint twice (expected once)")
         seen.add(joint.node)
@@ -68,7 +72,7 @@ def check_rotatable(skeleton: Skeleton, node: int) -> None:
         )
 
 
-def _check_joint(skeleton: Skeleton, subtrees: tuple[Ints, Ints], joint: SpringJoint) -> None:
+def _check_joint(skeleton: Skeleton, subtrees: tuple[Ints, Ints], depths: Ints, joint: SpringJoint) -> None:
     _check_node(skeleton, joint.node, "joint")
     check_rotatable(skeleton, joint.node)
     if joint.tail is None:
@@ -77,6 +81,11 @@ def _check_joint(skeleton: Skeleton, subtrees: tuple[Ints, Ints], joint: SpringJ
     if not hierarchy.is_below(subtrees, joint.tail, joint.node):
         raise FormatError(
             f"{skeleton.label(joint.tail)} follows {skeleton.label(joint.node)} (expected one of its descendants)"
+        )
+    if (count := int(depths[joint.tail] - depths[joint.node])) > MAX_TAIL_NODES:
+        raise UnsupportedError(
+            f"{skeleton.label(joint.tail)} is {count} nodes below {skeleton.label(joint.node)}, whose tail it is "
+            f"(limit {MAX_TAIL_NODES})"
         )
 
 

@@ -8,9 +8,11 @@ from anim.arrays import Floats
 from anim.maths import matrix
 from anim.model import Clip, Skeleton
 from anim.sampling import sample_pose, world_matrices
-from anim.simulation.spring_bones.chains import SpringBones
+from anim.simulation.spring_bones.chains import SpringBones, SpringJoint
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.collisions import TINY, cofactors, norms
+
+BLOCK_POINTS = 100_000  # positions of tails that are measured at once
 
 
 def deepest_penetration(skeleton: Skeleton, clip: Clip, bones: SpringBones, times: Floats) -> float:
@@ -22,14 +24,22 @@ def deepest_penetration(skeleton: Skeleton, clip: Clip, bones: SpringBones, time
     deepest = 0.0
     for chain in bones.chains:
         colliders = [_posed(bones.colliders[index], world) for index in chain.colliders]
-        for joint in chain.joints:
-            tail = world[:, joint.node] if joint.tail is None else world[:, joint.tail]
-            offset = joint.tail_offset if joint.tail is None else (0.0, 0.0, 0.0)
-            points = matrix.apply(tail, np.array([offset]))[:, 0]
+        count = max(1, BLOCK_POINTS // max(1, len(times)))
+        for first in range(0, len(chain.joints), count):
+            joints = chain.joints[first : first + count]
+            points = np.stack([_tail(joint, world) for joint in joints])
+            radii = np.array([joint.parameters.hit_radius for joint in joints])[:, None]
             for collider, matrices in colliders:
-                depth = joint.parameters.hit_radius - _distances(collider, matrices, points)
+                depth = radii - _distances(collider, matrices, points)
                 deepest = max(deepest, float(depth.max(initial=0.0)))
     return deepest
+
+
+def _tail(joint: SpringJoint, world: Floats) -> Floats:
+    """Positions (F, 3) of a joint's tail."""
+    if joint.tail is not None:
+        return world[:, joint.tail, :, 3]
+    return np.asarray(matrix.apply(world[:, joint.node], np.array([joint.tail_offset]))[:, 0])
 
 
 def _posed(collider: Collider, world: Floats) -> tuple[Collider, Floats]:
@@ -39,7 +49,7 @@ def _posed(collider: Collider, world: Floats) -> tuple[Collider, Floats]:
 
 
 def _distances(collider: Collider, matrices: Floats, points: Floats) -> Floats:
-    """Signed distances (F,) of points (F, 3) from a collider's surface, negative on the side that it keeps free."""
+    """Signed distances (J, F) of points (J, F, 3) from a collider, negative on the side that it keeps free."""
     ends = matrix.apply(matrices, np.array([collider.offset, collider.tail]))
     delta = points - ends[:, 0]
     if collider.shape is ColliderShape.PLANE:
@@ -49,6 +59,6 @@ def _distances(collider: Collider, matrices: Floats, points: Floats) -> Floats:
     if collider.shape is ColliderShape.CAPSULE:
         along = ends[:, 1] - ends[:, 0]
         fraction = (along * delta).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), TINY)
-        delta = delta - along * np.clip(fraction, 0, 1)[:, None]
-    distance = norms(delta)[:, 0] - collider.radius
+        delta = delta - along * np.clip(fraction, 0, 1)[..., None]
+    distance = norms(delta)[..., 0] - collider.radius
     return np.asarray(-distance if collider.inside else distance)

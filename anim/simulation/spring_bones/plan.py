@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Ints
-from anim.errors import FormatError
+from anim.errors import FormatError, UnsupportedError
 from anim.model import Skeleton
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, chain_label
 from anim.simulation.spring_bones.hierarchy import moving_nodes
+
+MAX_LEVELS = 512  # of joints below each other, each of which takes 65 µs a step; hair and ropes have tens
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +54,18 @@ class Plan:
 def make_plan(skeleton: Skeleton, bones: SpringBones) -> Plan:
     """Return the evaluation order of checked chains.
 
-    Raises FormatError if springs depend on each other in a circle: each collides with a collider that the other moves.
+    Raises FormatError if springs depend on each other in a circle: each collides with a collider that the other moves,
+    and UnsupportedError for more than MAX_LEVELS levels.
     """
     moving = moving_nodes(skeleton, bones)
     needed = _needed_nodes(skeleton, bones)
     joints = _planned_joints(bones)
     depth = _depths(skeleton, bones, {int(n) for n in needed if moving[n]}, joints)
+    if (count := max(depth.values(), default=0)) > MAX_LEVELS:
+        raise UnsupportedError(
+            f"{count} nodes below each other move with springs (limit {MAX_LEVELS})",
+            help="make the chains shorter",
+        )
     driven = np.array([n for n in needed if not moving[n]], np.int64)
     levels = []
     order = list(driven)

@@ -20,9 +20,8 @@ def build_joint(joint: RigidJoint) -> Any:
     builder = builder.local_frame1(_isometry(rapier, joint.frames[0]))
     builder = builder.local_frame2(_isometry(rapier, joint.frames[1]))
     builder = builder.contacts_enabled(joint.enable_collision)
-    coupled = []
+    coupled: list[str] = []
     for limit in joint.limits:
-        names = [AXES[limit.angular][axis] for axis in limit.axes]
         if _is_soft(limit):
             for axis in limit.axes:
                 target = limit.min if len(limit.axes) == 1 else 0.0
@@ -34,10 +33,13 @@ def build_joint(joint: RigidJoint) -> Any:
                     damping=limit.damping,
                 )
                 builder = _add_drive(rapier, builder, spring)
-        elif not _locked(limit) and _is_bounded(limit):
-            low, high = _bounds(limit)
-            builder = builder.limits(getattr(rapier.JointAxis, names[0]), low, high)
-            coupled += names if len(names) > 1 else []
+        elif _is_hard_range(limit):
+            alone, together = _divide_axes(limit, coupled)
+            for name in alone:
+                builder = builder.limits(getattr(rapier.JointAxis, name), *_bounds(limit, is_common=False))
+            if together:
+                builder = builder.limits(getattr(rapier.JointAxis, together[0]), *_bounds(limit, is_common=True))
+            coupled += together
     if coupled:
         builder = builder.coupled_axes(_mask(rapier, coupled))
     for drive in joint.drives:
@@ -49,7 +51,13 @@ def find_approximations(joint: RigidJoint) -> list[str]:
     """Return what Rapier does other than described, in words for a note."""
     soft_ranges = any(each.stiffness is not None and not _is_soft(each) and _is_bounded(each) for each in joint.limits)
     least = any(len(each.axes) > 1 and each.min > 0 for each in joint.limits)
-    return ["soft limits of a range are hard"] * soft_ranges + ["a least distance of 2 or 3 axes is ignored"] * least
+    angles = [len(each.axes) for each in joint.limits if each.angular and len(each.axes) > 1 and _is_hard_range(each)]
+    return [
+        *["soft limits of a range are hard"] * soft_ranges,
+        *["a least distance of 2 or 3 axes is ignored"] * least,
+        *["a limit of the angle about 3 axes is one of the swing, and one of the twist"] * (3 in angles),
+        *["of several limits of angles about 2 or 3 axes, all but the first are one of each axis"] * (len(angles) > 1),
+    ]
 
 
 def _is_bounded(limit: JointLimit) -> bool:
@@ -71,9 +79,29 @@ def _locked(limit: JointLimit) -> list[str]:
     return [AXES[limit.angular][axis] for axis in limit.axes]
 
 
-def _bounds(limit: JointLimit) -> tuple[float, float]:
+def _is_hard_range(limit: JointLimit) -> bool:
+    return not _is_soft(limit) and not _locked(limit) and _is_bounded(limit)
+
+
+def _divide_axes(limit: JointLimit, coupled: list[str]) -> tuple[list[str], list[str]]:
+    """Axes that have the limit each, and those that have it together. coupled: axes of the limits before.
+
+    Rapier has one cone of a joint, of exactly two angular axes: a third gets the range of the cone for itself.
+    """
+    names = [AXES[limit.angular][axis] for axis in limit.axes]
+    if len(names) == 1:
+        return names, []
+    if not limit.angular:
+        return [], names
+    if any(name in AXES[True] for name in coupled):
+        return [name for name in names if name not in coupled], []
+    return names[:-2], names[-2:]
+
+
+def _bounds(limit: JointLimit, *, is_common: bool) -> tuple[float, float]:
+    """Range of a limit. is_common: of several axes together, whose distance or angle is never negative."""
     most = math.pi if limit.angular else MAX_DISTANCE_M
-    low = limit.min if len(limit.axes) == 1 else 0.0
+    low = 0.0 if is_common else limit.min if len(limit.axes) == 1 else -limit.max
     return max(low, -most), min(limit.max, most)
 
 

@@ -15,7 +15,7 @@ from anim.arrays import Floats
 from anim.simulation.rigid_bodies.description import JointDrive, JointLimit, Motion, Vector
 from anim.simulation.rigid_bodies.extents import center_in_scene, smallest_radius
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, Frame, RigidBody, RigidJoint, RigidScene
-from anim.simulation.rigid_bodies.shapes import scale_shape
+from anim.simulation.rigid_bodies.shapes import ScaledShapes
 
 MIN_RADIUS_M = 0.0625  # of the smallest moving body, below which a scene is enlarged; hulls fail at a third of it
 ENLARGED_RADIUS_UNITS = 0.25  # at least, of that body then
@@ -59,26 +59,27 @@ def scale_scene(scene: RigidScene, units: float) -> RigidScene:
     """Return a scene with `units` length units per metre."""
     if units == 1.0:
         return scene
+    shapes = ScaledShapes()
     return RigidScene(
-        tuple(_scale_body(each, units) for each in scene.bodies),
+        tuple(_scale_body(each, units, shapes) for each in scene.bodies),
         tuple(_scale_joint(each, units) for each in scene.joints),
         _scale(scene.gravity, units),
     )
 
 
-def _scale_body(body: RigidBody, units: float) -> RigidBody:
+def _scale_body(body: RigidBody, units: float, shapes: ScaledShapes) -> RigidBody:
     return replace(
         body,
         frame=_scale_frame(body.frame, units),
-        colliders=tuple(_scale_collider(each, units) for each in body.colliders),
+        colliders=tuple(_scale_collider(each, units, shapes) for each in body.colliders),
         motion=_scale_motion(body.motion, units),
         linear_velocity=units * body.linear_velocity,
         radius=units * body.radius,
     )
 
 
-def _scale_collider(collider: BodyCollider, units: float) -> BodyCollider:
-    shape = scale_shape(collider.shape, units * np.eye(3))
+def _scale_collider(collider: BodyCollider, units: float, shapes: ScaledShapes) -> BodyCollider:
+    shape = shapes.scale(collider.shape, units * np.eye(3))
     return replace(collider, shape=shape, frame=_scale_frame(collider.frame, units))
 
 

@@ -91,6 +91,23 @@ def test_a_cone_of_two_angular_axes_stops_the_swing() -> None:
     assert np.arccos(np.clip(direction[-1, 0], -1, 1)) == pytest.approx(0.5, abs=0.03)
 
 
+def test_an_angle_about_three_axes_is_limited_as_swing_and_twist() -> None:
+    run = swing([LOCKED, {"angularAxes": [0, 1, 2], "max": 0.5}], motion={"angularVelocity": [4.0, 0, 0]})
+    rotations = path(run, 2, "rotation")
+    along = quaternion.rotate(rotations, np.array([1.0, 0, 0]))
+    twists = 2 * np.arctan2(rotations[:, 0], rotations[:, 3])
+    assert 0.45 < np.arccos(along[:, 0]).max() < 0.55
+    assert 0.4 < np.abs(twists).max() < 0.55
+    assert run.notes == ["a limit of the angle about 3 axes is one of the swing, and one of the twist"]
+
+
+def test_cones_of_several_limits_are_not_joined() -> None:
+    """Rapier panics for a joint whose coupled angular axes are three."""
+    run = swing([LOCKED, {"angularAxes": [1, 2], "max": 0.5}, {"angularAxes": [0, 1], "max": 0.2}])
+    assert 0.45 < np.linalg.norm(angles(run), axis=1).max() < 0.55
+    assert run.notes == ["of several limits of angles about 2 or 3 axes, all but the first are one of each axis"]
+
+
 def test_a_drive_holds_its_velocity() -> None:
     turning = {"type": "angular", "mode": "force", "axis": 2, "velocityTarget": 3.0, "damping": 500.0}
     run = swing([LOCKED, {"angularAxes": [0, 1], "max": 0}], [turning], gravity=(0, 0, 0), seconds=1.0)

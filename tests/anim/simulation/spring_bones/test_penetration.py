@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from anim.model import Clip
+from anim.simulation.spring_bones import penetration
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.penetration import deepest_penetration
@@ -54,3 +55,12 @@ def test_a_simulation_keeps_tails_out_of_a_ball() -> None:
         clip = simulate_springs(CHAIN, swaying(), bones, SpringOptions(warm_up=1)).clip
         depths.append(deepest_penetration(CHAIN, clip, met, times))
     assert depths[1] < 0.3 * depths[0]
+
+
+def test_tails_are_measured_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    ball = Collider(0, SPHERE, (0.1, 0.65, 0), radius=0.12)
+    bones = SpringBones((replace(BONES.chains[0], colliders=(0,)),), (ball,))
+    times = np.arange(61) / 60
+    whole = deepest_penetration(CHAIN, swaying(), bones, times)
+    monkeypatch.setattr(penetration, "BLOCK_POINTS", 1)
+    assert deepest_penetration(CHAIN, swaying(), bones, times) == whole > 0

@@ -9,6 +9,7 @@ import pytest
 
 from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnstableError, UnsupportedError
 from anim.model import Clip
+from anim.simulation.spring_bones import hierarchy, plan
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.simulate import SpringOptions, simulate_springs
@@ -148,3 +149,16 @@ def test_a_negative_radius_is_refused() -> None:
         Collider(0, ColliderShape.SPHERE, radius=-0.1)
     with pytest.raises(RangeError, match="normal is 0, 0, 0"):
         Collider(0, ColliderShape.PLANE, normal=(0, 0, 0))
+
+
+def test_a_chain_of_too_many_joints_is_refused_before_it_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plan, "MAX_LEVELS", 1)
+    with pytest.raises(UnsupportedError, match=r"2 nodes below each other move with springs \(limit 1\)"):
+        simulate_springs(CHAIN, swaying(), BONES)
+
+
+def test_a_tail_many_nodes_below_its_joint_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hierarchy, "MAX_TAIL_NODES", 1)
+    far = SpringBones((replace(ONE, joints=(SpringJoint(1, 3, SOFT),)),))
+    with pytest.raises(UnsupportedError, match=r"node 3 '3' is 2 nodes below node 1 '1', whose tail it is \(limit 1\)"):
+        simulate_springs(CHAIN, swaying(), far)
