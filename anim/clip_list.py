@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Iterator, Sequence
 from typing import overload
 
@@ -28,7 +29,7 @@ class Clips:
         if not isinstance(key, str):
             return self._checked(key)
         found = [i for i, name in enumerate(self.names) if name == key]
-        if not found and key.startswith("#") and key[1:].isdecimal():
+        if not found and re.fullmatch(r"#[0-9]{1,9}", key):
             return self._checked(int(key[1:]))
         if len(found) > 1:
             raise NotFoundError(f"{len(found)} clips are called '{key}'", help=f"take one by its index: {found}")

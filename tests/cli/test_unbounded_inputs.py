@@ -1,0 +1,53 @@
+"""Small inputs with numbers beyond all bounds: digits by thousands, values of another width."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import anim
+from anim.errors import NotFoundError
+from tests.cli.conftest import Call
+from tests.cli.running import built
+from tests.fixtures.reading import split
+from tests.fuzz.simulation_seeds import pack
+
+DIGITS = "9" * 5000
+
+
+@pytest.mark.parametrize("pointer", ["/meshes/0/weights/0", f"/meshes/0/weights/{DIGITS}", f"/nodes/{DIGITS}/weights"])
+@pytest.mark.parametrize("line", ["plot", "convert", "bake"])
+def test_pointers_to_weights_with_values_of_a_rotation(line: str, pointer: str, call: Call, tmp_path: Path) -> None:
+    document, blob = split(built("arm"))
+    clip = document["animations"][0]
+    sampler = next(each["sampler"] for each in clip["channels"] if each["target"]["path"] == "rotation")
+    target = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+    clip["channels"].append({"sampler": sampler, "target": target})
+    document["extensionsUsed"] = ["KHR_animation_pointer"]
+    (tmp_path / "in.glb").write_bytes(pack(document, blob))
+    output = {"plot": "out.svg", "convert": "out.gltf", "bake": "out.npz"}[line]
+    run = call(line, tmp_path / "in.glb", tmp_path / output, *(["--clip", "#0"] if line != "convert" else []))
+    assert run.code in (0, 3), run.err
+    assert "Traceback" not in run.err
+
+
+@pytest.mark.parametrize("pointer", ["/nodes", "/nodes/x", f"/nodes/{DIGITS}/extensions/KHR_node_visibility/visible"])
+def test_flip_books_with_pointers_to_nothing(pointer: str, call: Call, tmp_path: Path) -> None:
+    (tmp_path / "in.glb").write_bytes(built("arm"))
+    line = ("--layout", "flip-visibility", "--fps", "4", "--clip", "#0")
+    call("bake", tmp_path / "in.glb", tmp_path / "book.gltf", *line).product()
+    document = json.loads((tmp_path / "book.gltf").read_text())
+    for channel in document["animations"][0]["channels"]:
+        channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"] = pointer
+    (tmp_path / "book.gltf").write_text(json.dumps(document))
+    run = call("convert-cache", tmp_path / "book.gltf", tmp_path / "out.npz")
+    assert run.code in (0, 3), run.err
+    assert "Traceback" not in run.err
+
+
+def test_a_clip_index_of_thousands_of_digits_is_no_clip(tmp_path: Path) -> None:
+    (tmp_path / "in.glb").write_bytes(built("arm"))
+    with pytest.raises(NotFoundError):
+        anim.load(tmp_path / "in.glb").clips[f"#{DIGITS}"]
