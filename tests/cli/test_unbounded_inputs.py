@@ -10,7 +10,7 @@ import pytest
 import anim
 from anim.errors import NotFoundError
 from tests.cli.conftest import Call
-from tests.cli.running import built
+from tests.cli.running import built, refusal
 from tests.fixtures.reading import split
 from tests.fuzz.simulation_seeds import pack
 
@@ -51,3 +51,24 @@ def test_a_clip_index_of_thousands_of_digits_is_no_clip(tmp_path: Path) -> None:
     (tmp_path / "in.glb").write_bytes(built("arm"))
     with pytest.raises(NotFoundError):
         anim.load(tmp_path / "in.glb").clips[f"#{DIGITS}"]
+
+
+USDA = """#usda 1.0
+(
+    timeCodesPerSecond = RATE
+)
+def Mesh "m"
+{
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points.timeSamples = { 0: [(0, 0, 0), (1, 0, 0), (0, 1, 0)], 24: [(0, 0, 1), (1, 0, 0), (0, 1, 0)] }
+}
+"""
+
+
+@pytest.mark.parametrize("rate", ["0", "-1", "inf"])
+def test_usd_with_an_odd_rate_is_refused(rate: str, call: Call, tmp_path: Path) -> None:
+    """usd-core computes without an end at 0 time codes per second."""
+    pytest.importorskip("pxr")
+    (tmp_path / "in.usda").write_text(USDA.replace("RATE", rate))
+    assert "time codes per second" in refusal(call("convert-cache", tmp_path / "in.usda", tmp_path / "out.npz"), 3)

@@ -93,11 +93,11 @@ class _Stage:
         stages, geom, _ = usd_stage.package()
         self._stage = stages.Stage.Open(_single_layer(path))
         self._geom, self._default, self._earliest = geom, stages.TimeCode.Default(), stages.TimeCode.EarliestTime()
-        self.rate = float(self._stage.GetTimeCodesPerSecond()) or usd_writer.DEFAULT_FPS
+        self.rate = float(self._stage.GetTimeCodesPerSecond())
         self.unit = float(geom.GetStageMetersPerUnit(self._stage))
         if not (math.isfinite(self.rate) and self.rate > 0 and math.isfinite(self.unit) and self.unit > 0):
             raise FormatError(f"has {self.rate:g} time codes per second and {self.unit:g} m per unit")
-        self._meshes = usd_motion.meshes(self._stage)  # usd-core never ends with infinite time codes per second
+        self._meshes = usd_motion.meshes(self._stage)  # usd-core never ends with 0 or infinite time codes per second
         counts = [len(self._points(mesh)) for mesh in self._meshes]
         self._ends = np.cumsum([0, *counts])
         self.vertices = int(self._ends[-1])
