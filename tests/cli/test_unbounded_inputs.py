@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 import anim
+from anim.caches.child_process import ChildEndedError
+from anim.caches.formats import usd_reader
 from anim.errors import NotFoundError
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal
@@ -72,3 +76,38 @@ def test_usd_with_an_odd_rate_is_refused(rate: str, call: Call, tmp_path: Path) 
     pytest.importorskip("pxr")
     (tmp_path / "in.usda").write_text(USDA.replace("RATE", rate))
     assert "time codes per second" in refusal(call("convert-cache", tmp_path / "in.usda", tmp_path / "out.npz"), 3)
+
+
+def doubled(levels: int) -> str:
+    """A layer with prims that refer twice to the one before: 2**levels + 1 meshes."""
+    prims = [USDA.replace("RATE", "24")]
+    for i in range(1, levels + 1):
+        before = "m" if i == 1 else f"c{i - 1}"
+        two = f'def "a" (references = </{before}>) {{}}\ndef "b" (inherits = </{before}>) {{}}'
+        prims.append(f'class Xform "c{i}"\n{{\n{two}\n}}\n')
+    return "".join(prims) + f'def Xform "top" (references = </c{levels}>) {{}}\n'
+
+
+def test_references_of_a_layer_to_itself_are_counted(call: Call, tmp_path: Path) -> None:
+    """Half a million meshes of 2 kB took 13 s, and ended as a crash."""
+    pytest.importorskip("pxr")
+    (tmp_path / "in.usda").write_text(doubled(3))
+    assert "27 vertices" in call("convert-cache", tmp_path / "in.usda", tmp_path / "out.npz").err
+    (tmp_path / "in.usda").write_text(doubled(40))
+    problem = refusal(call("convert-cache", tmp_path / "in.usda", tmp_path / "out.npz"), 4)
+    assert "by its references to itself (limit 125000 with 1 GB)" in problem
+
+
+@pytest.mark.parametrize(("peak", "code"), [(0, 3), (10**8, 3), (10**9, 4)])
+def test_usd_core_that_ends_by_the_memory_limit(
+    peak: int, code: int, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def ended(*_: object, **__: object) -> Iterator[Iterator[int]]:
+        raise ChildEndedError(peak)
+        yield iter(())
+
+    monkeypatch.setattr(usd_reader, "run_in_child", ended)
+    (tmp_path / "in.usda").write_text(USDA.replace("RATE", "24"))
+    problem = refusal(call("convert-cache", tmp_path / "in.usda", tmp_path / "out.npz"), code)
+    assert ("needs more than 1 GB of memory" if code == 4 else "crashed") in problem
