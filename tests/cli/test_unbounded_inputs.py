@@ -111,3 +111,25 @@ def test_usd_core_that_ends_by_the_memory_limit(
     (tmp_path / "in.usda").write_text(USDA.replace("RATE", "24"))
     problem = refusal(call("convert-cache", tmp_path / "in.usda", tmp_path / "out.npz"), code)
     assert ("needs more than 1 GB of memory" if code == 4 else "crashed") in problem
+
+
+def test_a_model_without_a_size_for_particles(call: Call, tmp_path: Path) -> None:
+    """No option of the user is to blame, and one helps."""
+    document, blob = split(built("arm"))
+    for node in document["nodes"]:
+        node["scale"] = [0, 0, 0]
+    (tmp_path / "in.glb").write_bytes(pack(document, blob))
+    line = ("simulate", "particles", tmp_path / "in.glb", tmp_path / "out.glb", "--node", "#0", "--clip", "#0")
+    run = call(*line)
+    assert "is no radius of a particle" in refusal(run, 3)
+    assert "choose --size" in run.err
+
+
+def test_springs_of_a_file_without_a_clip_need_a_duration(call: Call, tmp_path: Path) -> None:
+    document, blob = split(built("arm"))
+    del document["animations"]
+    (tmp_path / "in.glb").write_bytes(pack(document, blob))
+    line = ("simulate", "springs", tmp_path / "in.glb", tmp_path / "out.glb", "--chain", "#0")
+    run = call(*line)
+    assert "has no clip with a length" in refusal(run, 2)
+    assert "choose --duration" in run.err
