@@ -133,3 +133,14 @@ def test_springs_of_a_file_without_a_clip_need_a_duration(call: Call, tmp_path: 
     run = call(*line)
     assert "has no clip with a length" in refusal(run, 2)
     assert "choose --duration" in run.err
+
+
+@pytest.mark.parametrize("names", [["E\u202e" * 2000], [f"EXT_{i}" for i in range(40_000)]], ids=["long", "many"])
+def test_names_in_messages_are_cut_as_they_are_shown(names: list[str], call: Call, tmp_path: Path) -> None:
+    """A note had 3200 characters, since every escape is six of them, and was a list of 1000 characters."""
+    document, blob = split(built("arm"))
+    document["extensionsRequired"] = document["extensionsUsed"] = names
+    (tmp_path / "in.glb").write_bytes(pack(document, blob))
+    run = call("retime", tmp_path / "in.glb", tmp_path / "out.glb", "--speed", "2")
+    (note,) = (line for line in run.err.splitlines() if "requires" in line)
+    assert len(note.removeprefix(f"note: {tmp_path / 'in.glb'}: ")) < 400
