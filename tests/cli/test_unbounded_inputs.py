@@ -13,6 +13,7 @@ import anim
 from anim.caches.child_process import ChildEndedError
 from anim.caches.formats import usd_reader
 from anim.errors import NotFoundError
+from anim.exchange.retarget import retarget
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal
 from tests.fixtures.reading import split
@@ -144,3 +145,36 @@ def test_names_in_messages_are_cut_as_they_are_shown(names: list[str], call: Cal
     run = call("retime", tmp_path / "in.glb", tmp_path / "out.glb", "--speed", "2")
     (note,) = (line for line in run.err.splitlines() if "requires" in line)
     assert len(note.removeprefix(f"note: {tmp_path / 'in.glb'}: ")) < 400
+
+
+def spinning(turns: dict[str, float]) -> str:
+    """Curves of two keys a second apart for each axis of a joint that the fixture `arm` has. turns: at the end."""
+    curves = {axis: {"times": [0, 1], "values": [0, 360 * number]} for axis, number in turns.items()}
+    about = {"schema": "euler-curves/1", "order": "XYZ", "frame": "extrinsic", "unit": "deg", "meters_per_unit": 1}
+    nodes = [{"name": "upper"}, {"name": "lower", "parent": "upper", "translation": [0, 1, 0], "curves": curves}]
+    return json.dumps({**about, "nodes": nodes})
+
+
+@pytest.mark.parametrize("onto", [False, True])
+def test_keys_are_limited_by_those_of_the_source(onto: bool, call: Call, tmp_path: Path) -> None:
+    """Four keys of 320 bytes became 444 172, in 5 s."""
+    (tmp_path / "arm.glb").write_bytes(built("arm"))
+    line = ("from-euler", tmp_path / "in.json", tmp_path / "out.glb", *(["--onto", tmp_path / "arm.glb"] * onto))
+    (tmp_path / "in.json").write_text(spinning({"rotation.x": 5555, "rotation.y": 5833}))
+    run = call(*line)
+    assert "node 'lower': the motion needs over 100000 keys" in refusal(run, 4)
+    assert "--keys grid adds none" in run.err
+    (tmp_path / "in.json").write_text(spinning({"rotation.x": 5555}))
+    assert call(*line[:3]).code == 0
+
+
+def test_poses_of_a_transfer_are_those_of_any_block(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """500 joints took 1.6 GB, for the poses of all segments at once."""
+    (tmp_path / "in.glb").write_bytes(built("biped"))
+    call("to-euler", tmp_path / "in.glb", tmp_path / "in.bvh", "--clip", "#0", "--fps", "10").product()
+    line = ("from-euler", tmp_path / "in.bvh", "-", "--keys", "adaptive", "--onto", tmp_path / "in.glb")
+    expected = call(*line).product()
+    monkeypatch.setattr(retarget, "BLOCK_MATRICES", 1)
+    assert call(*line).product() == expected
