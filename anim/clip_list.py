@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Iterator, Sequence
 from typing import overload
 
@@ -10,6 +11,7 @@ from anim.errors import NotFoundError, ShapeError
 from anim.gltf.reading import reader
 from anim.model import Clip
 from anim.operations.selection import not_found
+from anim.units import list_some
 
 
 class Clips:
@@ -27,9 +29,9 @@ class Clips:
         """Return the index of a clip by name or index. Raises NotFoundError, with similar names."""
         if not isinstance(key, str):
             return self._checked(key)
+        if re.fullmatch(r"#[0-9]{1,9}", key) and int(key[1:]) < len(self):
+            return int(key[1:])
         found = [i for i, name in enumerate(self.names) if name == key]
-        if not found and key.startswith("#") and key[1:].isdecimal():
-            return self._checked(int(key[1:]))
         if len(found) > 1:
             raise NotFoundError(f"{len(found)} clips are called '{key}'", help=f"take one by its index: {found}")
         if not found:
@@ -63,6 +65,6 @@ class Clips:
         except TypeError:
             raise ShapeError(f"a clip is taken by {type(key).__name__} (expected its name or its index)") from None
         except IndexError:
-            count = f"{len(self)} clips: {', '.join(self.names)}" if self._clips else "no clips"
+            count = f"{len(self)} clips: {list_some(self.names)}" if self._clips else "no clips"
             raise NotFoundError(f"there is no clip {key} (the file has {count})") from None
         return index

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from anim.errors import RangeError
 
@@ -15,6 +15,7 @@ _ZERO = r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*"
 _ZERO_ANGLE = r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*"
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+MAX_LISTED = 8  # names in a message
 MIN_EXPONENT_VALUE = 1e15  # more digits than a double has; 1e300 would be a line of 301
 
 
@@ -29,6 +30,12 @@ def format_number(value: float, digits: int) -> str:
 def plural(count: int, noun: str, many: str = "") -> str:
     """Return "1 clip", "3 clips"; with `many`, a plural without s: "3 vertices"."""
     return f"{count} {noun if count == 1 else many or noun + 's'}"
+
+
+def list_some(names: Sequence[str]) -> str:
+    """Return at most MAX_LISTED names: "a, b, c", or "a, b, c, d, e, f, g, h and 12 more"."""
+    more = len(names) - MAX_LISTED
+    return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def parse_fraction(text: str, name: str) -> float:

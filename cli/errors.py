@@ -20,7 +20,7 @@ from anim.errors import (
     UnsupportedError,
     is_out_of_memory,
 )
-from cli.tables import cut_middle, escape_control
+from cli.tables import quote
 from cli.text import Reporter
 
 PROGRAM = "gltf-anim"
@@ -104,9 +104,9 @@ def report_error(error: AnimError) -> int:
     if code == BUG:
         vars(error).pop("__notes__", None)  # the help, which is written separately
         _print_trace()
-    where = f"{cut_middle(error.where)}: " if error.where else ""
+    where = f"{quote(error.where)}: " if error.where else ""
     # Reports of several files print errors on their own, without the options of a command
-    _print_error(where + cut_middle(error.problem), common_options(error.help))
+    _print_error(where + quote(error.problem), common_options(error.help))
     return code
 
 
@@ -141,9 +141,9 @@ def _has_output(context: Any) -> bool:
 
 def _print_error(problem: str, hint: str) -> None:
     reporter = Reporter()  # the exit code stays the same if stderr is closed
-    reporter.info(f"{PROGRAM}: {escape_control(problem)}")
+    reporter.info(f"{PROGRAM}: {problem}")
     if hint:
-        reporter.info(f"help: {escape_control(cut_middle(hint))}")
+        reporter.info(f"help: {quote(hint)}")
 
 
 def _print_trace() -> None:

@@ -51,6 +51,11 @@ def cut_middle(words: str, length: int = MAX_QUOTED_LENGTH) -> str:
     return f"{words[: length - end - 1]}…{words[-end:]}"
 
 
+def quote(words: str, length: int = MAX_QUOTED_LENGTH) -> str:
+    """Return text of at most `length` characters as it is shown: with escapes, each of which may be ten characters."""
+    return cut_middle(escape_control(cut_middle(words, length)), length)
+
+
 def _shown_column(cells: Sequence[Cell]) -> list[str]:
     shown = [cell if type(cell) is str else _shown(cell) for cell in cells]
     return shown if "".join(shown).isprintable() else list(map(escape_control, shown))

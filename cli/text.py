@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from anim.units import MIN_EXPONENT_VALUE, format_number
 from cli.streams import step_streams
-from cli.tables import cut_middle, escape_control
+from cli.tables import quote
 
 MAX_LINE_LENGTH = 1000  # characters of a message: names in a file can have any length
 MIN_PERCENT = 1e-4
@@ -29,7 +29,7 @@ class Reporter:
     def info(self, line: str) -> None:
         """Write a line to stderr unless quiet: cut if very long, and one line whatever names of a file contain."""
         if not self.quiet:
-            self._write(escape_control(cut_middle(line, MAX_LINE_LENGTH)))
+            self._write(quote(line, MAX_LINE_LENGTH))
 
     def _write(self, line: str) -> None:
         if (step := step_streams()) is not None:

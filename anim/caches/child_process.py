@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import threading
@@ -25,7 +26,14 @@ PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from anim.caches import child
 
 
 class ChildEndedError(Exception):
-    """The child ended before its work did: native code has crashed, or the system ended it."""
+    """The child ended before its work did: native code has crashed, or the system ended it.
+
+    peak_bytes: most memory that it had, 0 if unknown.
+    """
+
+    def __init__(self, peak_bytes: int = 0) -> None:
+        super().__init__()
+        self.peak_bytes = peak_bytes
 
 
 @contextmanager
@@ -52,7 +60,7 @@ def run_in_child(function: Callable[..., Iterator[Any]], *arguments: Any, limit_
     with process.stdout:
         try:
             _send(process.stdin, task)
-            yield _messages(process.stdout)
+            yield _messages(process, process.stdout)
         finally:
             process.kill()
             process.wait()
@@ -113,14 +121,28 @@ def _send(pipe: IO[bytes], data: bytes) -> None:
             raise
 
 
-def _messages(pipe: IO[bytes]) -> Iterator[Any]:
+def _messages(process: subprocess.Popen[bytes], pipe: IO[bytes]) -> Iterator[Any]:
     while True:
         try:
             message, end = pickle.load(pipe)
         except (EOFError, pickle.UnpicklingError):
-            raise ChildEndedError from None
+            raise ChildEndedError(_peak_bytes(process)) from None
         if isinstance(end, StopIteration):
             return
         if end is not None:
             raise end
         yield message
+
+
+def _peak_bytes(process: subprocess.Popen[bytes]) -> int:
+    """Most memory that the child had, which ends; 0 if it is unknown: on other systems than Linux, or less than this
+    process had, with which the child's figure starts.
+    """
+    if sys.platform != "linux" or process.returncode is not None:
+        return 0
+    os.kill(process.pid, signal.SIGKILL)  # `process.kill` takes the figures of one that has ended
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    import resource  # not on Windows
+
+    return 1024 * usage.ru_maxrss if usage.ru_maxrss > resource.getrusage(resource.RUSAGE_SELF).ru_maxrss else 0

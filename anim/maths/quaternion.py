@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import RangeError
+from anim.errors import DataRangeError
 
 MIN_ANGLE = 1e-20  # rad, instead of 0 between equal rotations: sines of it and of its parts are these themselves
 LARGE = 1 << 20  # components; products of more are summed one by one, which needs a fifth of the memory
@@ -52,12 +52,12 @@ def dot(a: Floats, b: Floats) -> Floats:
 def normalize(q: Floats) -> Floats:
     """Return quaternions (..., 4) scaled to unit length, signs kept.
 
-    Raises RangeError if one has no length.
+    Raises DataRangeError if one has no length.
     normalize([0, 0, 0, 2]) → [0, 0, 0, 1]
     """
     length = np.sqrt(dot(q, q))[..., None]
     if not (length > 0).all():
-        raise RangeError("a quaternion of length 0 has no direction (expected a rotation)")
+        raise DataRangeError("a quaternion of length 0 has no direction (expected a rotation)")
     return np.asarray(q / length)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Collection, Iterable, Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
@@ -65,8 +66,8 @@ def track_indices(clip: Clip, tracks: Collection[int] | None) -> frozenset[int]:
 def match_names(globs: Sequence[str], names: Sequence[str], what: str) -> list[int]:
     """Return the indices of the names that match any of the globs; all without globs.
 
-    "#3" is index 3, with any name. A glob that is a name itself, "Run[1]", is that name only. Upper and lower case
-    differ.
+    "#3" is index 3, with any name; one that is called "#3" is "[#]3", if it is not index 3. A glob that is a name
+    itself, "Run[1]", is that name only. Upper and lower case differ.
     Raises NotFoundError, with similar names, for a glob that matches none.
     """
     if not globs:
@@ -86,8 +87,10 @@ def not_found(name: str, names: Iterable[str], what: str) -> NotFoundError:
 
 
 def _matches(glob: str, names: Sequence[str]) -> set[int]:
-    """Indices of the names that are `glob` itself, otherwise of those that match it."""
-    exact = {i for i, name in enumerate(names) if glob in (name, f"#{i}") or (name == f"#{i}" and glob == str(i))}
+    """The index that `glob` is, else indices of the names that are `glob` itself, otherwise of those that match it."""
+    if re.fullmatch(r"#(0|[1-9][0-9]{0,8})", glob) and int(glob[1:]) < len(names):
+        return {int(glob[1:])}
+    exact = {i for i, name in enumerate(names) if glob == name or (name == f"#{i}" and glob == str(i))}
     return exact or {i for i, name in enumerate(names) if fnmatchcase(name, glob)}
 
 

@@ -19,6 +19,7 @@ from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
 from anim.operations.close_loop import close_loop
 from anim.operations.selection import Selection
+from anim.units import list_some
 from cli import tables
 from cli.errors import UsageError
 from cli.io import documents, scenes
@@ -139,7 +140,7 @@ class _Closing:
         if self._problems:
             raise UsageError(f"{self._path}: {'; '.join(self._problems)}", help=HELP)
         if self._poses:
-            yield f"a single pose, without a loop to close: {', '.join(self._poses)}"
+            yield f"a single pose, without a loop to close: {list_some(self._poses)}"
 
 
 def _label(clip: Clip) -> str:

@@ -31,6 +31,7 @@ from anim.gltf.io.source import (
     write_file,
 )
 from anim.gltf.validation.extensions import unknown_required
+from anim.units import list_some
 from cli import tables
 from cli.errors import UsageError
 from cli.io import depfile, output_names, stdout
@@ -88,7 +89,8 @@ def repaired_note(document: Document, name: str, reporter: Reporter) -> None:
 
 def _note_unknown_extensions(document: Document, name: str, reporter: Reporter) -> None:
     if unknown := unknown_required(document.json):
-        words = f"requires {', '.join(unknown)}, not supported here: kept as it is, and nothing is measured with it"
+        names = tables.quote(list_some(unknown))
+        words = f"requires {names}, not supported here: kept as it is, and nothing is measured with it"
         reporter.info(f"note: {name}: {words}")
 
 

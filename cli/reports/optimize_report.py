@@ -17,7 +17,7 @@ from anim.optimization.options import Drop, Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from anim.optimization.writing import KEY
-from anim.units import format_number, plural
+from anim.units import format_number, list_some, plural
 from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
@@ -202,5 +202,5 @@ def _policy(about: OptimizeReport) -> list[str]:
         words.append(f"moved {plural(len(about.found.moved), 'rest value')}")
     if about.found.without_loss:
         names = [reader.clip_name(about.clips[i].name, i) for i in about.found.without_loss]
-        words.append(f"kept without loss, as no smaller way held all bounds: {', '.join(names)}")
+        words.append(f"kept without loss, as no smaller way held all bounds: {list_some(names)}")
     return [f"  {'; '.join(words)}"] if words else []

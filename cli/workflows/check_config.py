@@ -149,6 +149,8 @@ def _budget(path: Path, entry: Any) -> Budget:
     for key in ("match", *(("against",) if "error" in entry else ())):
         if key not in entry:
             raise UsageError(f"{path}: [[budget]] has no {key}")
+    if "\0" in entry.get("against", ""):
+        raise UsageError(f"{path}: `against` of [[budget]] has a null character (no file name can)")
     try:
         output_names.check_placeholders(entry.get("against", ""), (*output_names.OF_PATHS, SUBFOLDER))
     except UsageError as error:

@@ -157,6 +157,7 @@ class FileChecker:
             return limited, ()
         source_path = str(config.source_of(Path(path), budget))
         try:
+            _check_regular(source_path)
             with checked_files.open_checked(source_path) as (_, source):
                 limit = units.parse_length(budget.error, "error", lambda: source.diagonal)
                 return replace(limited, budget={**limited.budget, ERROR: limit}, source=source), ()
@@ -192,3 +193,9 @@ class FileChecker:
                     for each in result.applied
                 )
                 self.reporter.info(f"{source.name}  fixed {fixes}{DRY if self.dry_run else ''}")
+
+
+def _check_regular(source: str) -> None:
+    """Raise FormatError for a source that is a pipe or device, which a check would wait for without an end."""
+    if os.path.exists(source) and not os.path.isfile(source) and not os.path.isdir(source):
+        raise FormatError("is no regular file")

@@ -15,6 +15,7 @@ from cli.tables import cut_middle
 NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
 Keys: TypeAlias = Mapping[str, type | tuple[type, ...]]  # allowed keys, and the types of their values
 TYPE_NAMES = {str: "text", bool: "true or false", int: "a whole number", list: "a list", dict: "a table"}
+MAX_INTEGER = 2**63 - 1  # of TOML
 SECTIONS: Keys = {"check": dict, "budget": list, "recipe": list}
 
 
@@ -63,10 +64,27 @@ def _table(path: Path) -> dict[str, Any] | None:
         return None
     except RecursionError:
         raise UsageError(f"{path}: is nested too deep") from None
-    except (OSError, ValueError) as error:  # of TOML, or of UTF-8
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path}: {error}") from None
-    if path.name != PROJECT:
-        return content
-    tools = content.get("tool")
-    table = tools.get("gltf-anim") if isinstance(tools, dict) else None
-    return table if isinstance(table, dict) else None
+    except ValueError:  # Python's limit of digits
+        raise UsageError(f"{path}: has a whole number of thousands of digits (TOML has 64 bits)") from None
+    table: object = content
+    if path.name == PROJECT:
+        tools = content.get("tool")
+        table = tools.get("gltf-anim") if isinstance(tools, dict) else None
+    if not isinstance(table, dict):
+        return None
+    _check_integers(path, "", table)
+    return table
+
+
+def _check_integers(path: Path, where: str, value: object) -> None:
+    """Raise UsageError for a whole number beyond the 64 bits of TOML: no float, and no message, may hold it."""
+    if isinstance(value, dict):
+        for key, each in value.items():
+            _check_integers(path, f"{where}.{key}".lstrip("."), each)
+    elif isinstance(value, list):
+        for each in value:
+            _check_integers(path, where, each)
+    elif isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
+        raise UsageError(f"{path}: {where} is a whole number that TOML can't hold (expected at most {MAX_INTEGER})")

@@ -15,6 +15,7 @@ from anim.gltf.reading import reader
 from anim.measure.compare.vertex_distance import vertex_distance
 from anim.model import Clip, Scene, VertexCache
 from anim.operations.selection import Selection
+from anim.units import list_some
 from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
 from cli.reports.vertex_report import VertexReport
@@ -119,7 +120,7 @@ def _of_documents(
     sides = ((source[0].scene_of(), clip), (baked[0].scene_of(), played))
     first, second, missing = pair_documents(*sides)
     if missing:
-        reporter.warn(f"{baked[0].name}: has no mesh like {', '.join(missing)}")
+        reporter.warn(f"{baked[0].name}: has no mesh like {list_some(missing)}")
     return clip.name, first, second
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -35,13 +36,32 @@ def test_settings_come_from_the_nearest_file_upwards(folder: Path, call: Call) -
         ('[check]\ntarget = "nobody"\n', "there is no target"),
         ('[[check.files]]\nignore = ["GA1"]\n', "has no match"),
         ("[check\n", "gltf-anim.toml: "),
+        (f'[[budget]]\nmatch = "*"\nbytes = {"9" * 6000}\n', "number of thousands of digits (TOML has 64 bits)"),
+        (f'[[budget]]\nmatch = "*"\nbytes = {"9" * 4000}\n', "budget.bytes is a whole number that TOML can't hold"),
+        (f"[check]\nselect = 0x{'f' * 6000}\n", "check.select is a whole number that TOML can't hold"),
+        (f'[check]\nparams = {{"GA109.regular" = [0x{"f" * 6000}]}}\n', "check.params.GA109.regular is a whole number"),
+        ('[[budget]]\nmatch = "*"\nerror = "1mm"\nagainst = "a\\u0000b"\n', "against of [[budget]] has a null"),
     ],
+    ids=lambda text: text[:60],
 )
 def test_wrong_settings_are_refused(text: str, words: str, folder: Path, call: Call) -> None:
     (folder / "gltf-anim.toml").write_text(text)
     run = call("check", "noop.glb")
     assert (run.code, run.text) == (2, "")
     assert words in run.err
+    assert "sys." not in run.err
+
+
+@pytest.mark.parametrize("against", ["fifo", "/dev/zero", "crowd", "x" * 5000])
+def test_sources_of_budgets_are_regular_files(against: str, folder: Path, call: Call) -> None:
+    """A check waited for a writer of the pipe."""
+    os.mkfifo(folder / "fifo")
+    (folder / "gltf-anim.toml").write_text(f'[[budget]]\nmatch = "*"\nerror = "1mm"\nagainst = "{against}"\n')
+    run = call("check", "noop.glb", "--format", "json")
+    assert run.code == 3
+    assert run.json["findings"] is not None
+    words = {"crowd": "is a folder", "x" * 5000: "name too long"}
+    assert words.get(against, "is no regular file") in run.err
 
 
 def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> None:

@@ -239,8 +239,8 @@ def test_angles_of_many_thousand_turns_are_refused(call: Call, tmp_path: Path) -
     curves.write_text("time,hip.rx,hip.ry,hip.rz\n0,0,0,0\n1,5.4e7,3,4\n2,0,0,0\n")
     options = ("--order", "XYZ", "--axes", "intrinsic", "--unit", "deg")
     done = call("from-euler", str(curves), str(tmp_path / "out.glb"), *options)
-    assert done.code == 3
-    assert "needs over 500000 keys" in done.err
+    assert done.code == 4
+    assert "over 100000 keys" in done.err
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no /dev/zero")

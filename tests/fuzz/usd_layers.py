@@ -19,9 +19,9 @@ def run(arguments: Sequence[str]) -> int:
     _, path = arguments
     try:
         with limit_allocations(limit_for(Path(path).stat().st_size)):
-            (stage,) = usd_meshes.summary(path)
+            (stage,) = usd_meshes.summary(path, limit_for(0))
             directions = {"normals": stage.has_normals, "tangents": stage.handedness is not None}
-            for _ in usd_meshes.frames(path, codes=stage.codes, **directions):
+            for _ in usd_meshes.frames(path, limit_for(0), codes=stage.codes, **directions):
                 pass
     except AnimError as error:
         print(error, file=sys.stderr)  # noqa: T201

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -15,6 +16,7 @@ from anim.gltf.validation import channel_targets
 from anim.model import FrameChunk, VertexCache
 
 Page = list[Json]  # primitives of one frame, of all meshes
+_NODE_POINTER = re.compile(r"/nodes/(0|[1-9][0-9]{0,8})(?=/|$)")
 
 
 def read_pages(document: Document) -> VertexCache | None:
@@ -87,8 +89,10 @@ def _switched_node(channel: Json) -> int | None:
     target = channel_targets.channel_target(channel)
     if target is None:
         return None
-    words = (target[2] or "").split("/")
-    return target[0] if target[0] is not None else int(words[2]) if words[1:2] == ["nodes"] else None
+    if target[0] is not None:
+        return target[0]
+    match = _NODE_POINTER.match(target[2] or "")
+    return int(match[1]) if match else None
 
 
 def _faces(accessors: Accessors, page: Page, counts: Sequence[int]) -> Ints:

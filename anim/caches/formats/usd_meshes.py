@@ -12,11 +12,12 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks
-from anim.caches.formats import usd_motion, usd_stage, usd_writer
+from anim.caches.formats import usd_motion, usd_prims, usd_stage, usd_writer
 from anim.errors import FormatError
 from anim.model import FrameChunk
 
 UNREADABLE = "is no USD that can be read"
+MORE_MEMORY = "if it is large, raise `memory_limit`"
 
 
 class StageSummary(NamedTuple):
@@ -38,13 +39,14 @@ class StageSummary(NamedTuple):
     handedness: Floats | None
 
 
-def summary(path: str) -> Iterator[StageSummary]:
+def summary(path: str, limit_bytes: int) -> Iterator[StageSummary]:
     """Yield the summary of the stage in a file.
 
-    Raises UnsupportedError without usd-core and for a PointInstancer, FormatError without meshes.
+    limit_bytes: of memory. Raises UnsupportedError without usd-core, for a PointInstancer and for prims that take more
+    memory, FormatError without meshes.
     """
     with _format_errors():
-        stage = _Stage(path)
+        stage = _Stage(path, limit_bytes)
         still = stage.positions(None)
         yield StageSummary(
             stage.codes(),
@@ -59,10 +61,10 @@ def summary(path: str) -> Iterator[StageSummary]:
         )
 
 
-def frames(path: str, codes: Floats, *, normals: bool, tangents: bool) -> Iterator[FrameChunk]:
+def frames(path: str, limit_bytes: int, codes: Floats, *, normals: bool, tangents: bool) -> Iterator[FrameChunk]:
     """Yield positions in metres, normals and tangents at the time codes, in blocks of bounded size."""
     with _format_errors():
-        stage = _Stage(path)
+        stage = _Stage(path, limit_bytes)
         step = frame_blocks.per_chunk(stage.vertices)
         for first in range(0, len(codes), step):
             some = codes[first : first + step].tolist()
@@ -81,7 +83,7 @@ def _format_errors() -> Iterator[None]:
     try:
         yield
     except Tf.ErrorException:  # its messages are about its source code
-        raise FormatError(UNREADABLE, help="if it is large, raise `memory_limit`") from None
+        raise FormatError(UNREADABLE, help=MORE_MEMORY) from None
     except (TypeError, ValueError, LookupError, ArithmeticError, RuntimeError):
         raise FormatError(UNREADABLE) from None
 
@@ -89,15 +91,15 @@ def _format_errors() -> Iterator[None]:
 class _Stage:
     """Meshes of a stage, opened from an input."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, limit_bytes: int) -> None:
         stages, geom, _ = usd_stage.package()
-        self._stage = stages.Stage.Open(_single_layer(path))
+        self._stage = stages.Stage.Open(_single_layer(path, limit_bytes))
         self._geom, self._default, self._earliest = geom, stages.TimeCode.Default(), stages.TimeCode.EarliestTime()
-        self.rate = float(self._stage.GetTimeCodesPerSecond()) or usd_writer.DEFAULT_FPS
+        self.rate = float(self._stage.GetTimeCodesPerSecond())
         self.unit = float(geom.GetStageMetersPerUnit(self._stage))
         if not (math.isfinite(self.rate) and self.rate > 0 and math.isfinite(self.unit) and self.unit > 0):
             raise FormatError(f"has {self.rate:g} time codes per second and {self.unit:g} m per unit")
-        self._meshes = usd_motion.meshes(self._stage)  # usd-core never ends with infinite time codes per second
+        self._meshes = usd_motion.meshes(self._stage)  # usd-core never ends with 0 or infinite time codes per second
         counts = [len(self._points(mesh)) for mesh in self._meshes]
         self._ends = np.cumsum([0, *counts])
         self.vertices = int(self._ends[-1])
@@ -183,8 +185,11 @@ class _Stage:
         return found if found is not None and len(found) == len(self._points(mesh)) else None
 
 
-def _single_layer(path: str) -> Any:
-    """The layer in a file. Raises FormatError if it names other files: only files that the user names are read."""
+def _single_layer(path: str, limit_bytes: int) -> Any:
+    """The layer in a file. Raises FormatError if it names other files: only files that the user names are read.
+
+    Raises UnsupportedError for one that refers to itself so often that its prims take more memory than the limit.
+    """
     from pxr import Sdf, Tf
 
     layer = Sdf.Layer.FindOrOpen(path)
@@ -192,16 +197,21 @@ def _single_layer(path: str) -> Any:
         raise Tf.ErrorException("no layer")
     others = [each for each in layer.GetCompositionAssetDependencies() if each]
     clips: list[str] = []
+    refers = False
 
     def look(spec_path: Any) -> None:
+        nonlocal refers
         spec = layer.GetObjectAtPath(spec_path)
         if spec is not None and spec.HasInfo("clips"):
             clips.append(str(spec_path))
+        refers = refers or (spec is not None and any(map(spec.HasInfo, usd_prims.ARCS)))
 
     layer.Traverse(Sdf.Path.absoluteRootPath, look)
     if others or clips:
         other = f"'{others[0]}'" if others else f"value clips at {clips[0]}"
         raise FormatError(f"refers to other files ({other}): only one layer is read", help="flatten the stage")
+    if refers:
+        usd_prims.check_size(layer, limit_bytes)
     return layer
 
 

@@ -15,9 +15,11 @@ from anim.caches.formats import usd_meshes
 from anim.caches.formats.npz import parts_of
 from anim.caches.options import ReadOptions
 from anim.caches.storage import Inputs
-from anim.errors import FormatError
+from anim.errors import FormatError, UnsupportedError
 from anim.memory import limit_for
 from anim.model import FrameChunk, VertexCache
+
+NEAR_LIMIT = 0.8  # of the limit of memory: allocations are of large blocks, the last of which fails
 
 
 def read(inputs: Inputs, reading: ReadOptions, *, ending: str = ".usd") -> VertexCache:
@@ -51,11 +53,19 @@ def _chunks(inputs: Inputs, ending: str, codes: Floats, normals: bool, tangents:
 
 
 @contextmanager
-def _run(inputs: Inputs, ending: str, function: Callable[[str], Iterator[Any]]) -> Iterator[Iterator[Any]]:
-    """Provide what `function` yields for the main file. A crash of usd-core becomes a FormatError."""
+def _run(inputs: Inputs, ending: str, function: Callable[[str, int], Iterator[Any]]) -> Iterator[Iterator[Any]]:
+    """Provide what `function` yields for the main file and the limit of memory.
+
+    A crash of usd-core becomes a FormatError, or an UnsupportedError if it had about as much memory as it may.
+    """
     with temporary_files.temp_input(inputs, inputs.main, ending) as path:
+        limit = limit_for(os.stat(path).st_size)
         try:
-            with run_in_child(function, path, limit_bytes=limit_for(os.stat(path).st_size)) as messages:
+            with run_in_child(function, path, limit, limit_bytes=limit) as messages:
                 yield messages
-        except ChildEndedError:
-            raise FormatError(f"{usd_meshes.UNREADABLE}: usd-core crashed") from None
+        except ChildEndedError as error:
+            if error.peak_bytes > NEAR_LIMIT * limit:
+                raise UnsupportedError(
+                    f"usd-core needs more than {limit / 1e9:.3g} GB of memory for it", help="raise `memory_limit`"
+                ) from None
+            raise FormatError(f"{usd_meshes.UNREADABLE}: usd-core crashed", help=usd_meshes.MORE_MEMORY) from None

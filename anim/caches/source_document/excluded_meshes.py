@@ -8,7 +8,7 @@ from collections.abc import Collection
 from anim.gltf.document import Json, json_array
 from anim.gltf.writing.references import unknown_indices
 
-_MESH_POINTER = re.compile(r"^/meshes/([0-9]+)(?=/)")
+_MESH_POINTER = re.compile(r"^/meshes/(0|[1-9][0-9]{0,8})(?=/)")
 
 
 def drop_meshes(json: Json, candidates: Collection[int], clip: Json) -> None:

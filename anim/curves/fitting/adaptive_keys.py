@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from anim.arrays import Floats, Ints, unique_sorted
-from anim.errors import DataRangeError
+from anim.errors import UnsupportedError
 from anim.maths import hermite, quaternion
 from anim.model import Interpolation, Track
 from anim.sampling.times import distinct_float32, just_before
@@ -50,14 +50,16 @@ class TrackFunction:
     travel: Callable[[Floats, Floats], Floats] | None = None
 
 
-def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tuple[Floats, Floats]:
+def linear_keys(
+    motion: TrackFunction, knots: Floats, *, tolerance: float, limit: int | None = None
+) -> tuple[Floats, Floats]:
     """Return key times (K,) and values (K, C) with slerp, or lerp, within `tolerance` of the motion.
 
     knots: (T,) s, increasing, between which the motion is smooth; each one is a key. At a jump of the value there is
     another key at the previous float32 time. No segment rotates by more than 120°; signs are continuous.
     tolerance: radians for rotations, the value's own unit otherwise; > 0.
     XYZ (0, 0, 0) → (90°, 90°, 0) at 0.1° → 15 keys
-    Raises DataRangeError for over MAX_KEYS keys.
+    Raises UnsupportedError for over `limit` keys, MAX_KEYS by default, before they are computed.
     """
 
     def count(a: Floats, b: Floats) -> Ints:
@@ -68,7 +70,8 @@ def linear_keys(motion: TrackFunction, knots: Floats, *, tolerance: float) -> tu
             return rotation_segment_count(values[:, :, None], tolerance)
         return vector_segment_count(values[:, :, None], tolerance)
 
-    times = refine(_split_by_travel(motion, knots), count)
+    limit = MAX_KEYS if limit is None else limit
+    times = refine(_split_by_travel(motion, knots, limit), count, limit)
     values = motion.values(times, False)
     earlier = just_before(times[1:])
     arriving = motion.values(times[1:], True)
@@ -117,13 +120,14 @@ def float32_tolerance(track: Track, tolerance: float) -> float:
     return max(tolerance, 4 * float(np.spacing(np.float32(np.abs(track.values).max(initial=0.0)))))
 
 
-def refine(times: Floats, count: SegmentCount) -> Floats:
+def refine(times: Floats, count: SegmentCount, limit: int | None = None) -> Floats:
     """Return times (T,) and added float32-exact ones, until no segment needs to be split.
 
     count: takes segments from a to b (B,), returns for each the number of segments (B,), up to MAX_SUBDIVISIONS, to
     split it into; 1 for none.
-    Raises DataRangeError for over MAX_KEYS keys.
+    Raises UnsupportedError for over `limit` keys, MAX_KEYS by default, before they are computed.
     """
+    limit = MAX_KEYS if limit is None else limit
     found, a, b = [times], times[:-1], times[1:]
     for _ in range(MAX_ROUNDS):
         middle = round_to_float32((a + b) / 2)
@@ -133,8 +137,8 @@ def refine(times: Floats, count: SegmentCount) -> Floats:
             break
         counts = _count_in_blocks(count, a, b)
         again = counts > 1
-        if counts[again].sum() + sum(map(len, found)) > MAX_KEYS:
-            raise DataRangeError(f"the motion needs over {MAX_KEYS} keys (raise the tolerance?)")
+        if counts[again].sum() + sum(map(len, found)) > limit:
+            raise UnsupportedError(f"the motion needs over {limit} keys")
         a, b = split_segments(a[again], b[again], counts[again])
         found.append(a)
     return unique_sorted(np.concatenate(found))
@@ -203,12 +207,12 @@ def _inner_fractions(values: Floats) -> Floats:
     return np.asarray(np.arange(1, last) / last)
 
 
-def _split_by_travel(motion: TrackFunction, knots: Floats) -> Floats:
+def _split_by_travel(motion: TrackFunction, knots: Floats, limit: int) -> Floats:
     if motion.travel is None or len(knots) < 2:
         return knots
     counts = np.maximum(np.ceil(motion.travel(knots[:-1], knots[1:]) / MAX_TRAVEL_RAD), 1)
-    if counts.sum() > MAX_KEYS:
-        raise DataRangeError(f"the angles run through so many turns that over {MAX_KEYS} keys are needed")
+    if counts.sum() > limit:
+        raise UnsupportedError(f"the angles run through so many turns that over {limit} keys are needed")
     return np.append(split_segments(knots[:-1], knots[1:], counts.astype(np.int64))[0], knots[-1])
 
 

@@ -53,13 +53,15 @@ class StackedKeys(NamedTuple):
     values: Floats
 
 
-def fit_linear_keys(stack: MotionStack, motion: Ints, knots: Floats, *, tolerance: float) -> StackedKeys:
+def fit_linear_keys(
+    stack: MotionStack, motion: Ints, knots: Floats, *, tolerance: float, most: int = MAX_KEYS
+) -> StackedKeys:
     """Return the keys that `adaptive_keys.linear_keys` gives each motion, equal to the bit.
 
     motion, knots: (T,) index and time of each knot; by motion, increasing times within each. Motions that need more
-    keys than their share of MAX_STACK_KEYS, or too many, are omitted: memory stays that of the others.
+    keys than their share of MAX_STACK_KEYS, or than `most`, are omitted: memory stays that of the others.
     """
-    limit = min(MAX_KEYS, MAX_STACK_KEYS // (len(np.flatnonzero(np.diff(motion))) + 1))
+    limit = min(MAX_KEYS, most, MAX_STACK_KEYS // (len(np.flatnonzero(np.diff(motion))) + 1))
     motion, times = _split_by_travel(stack, motion, knots, limit)
     motion, times = _refine(stack, motion, times, tolerance, limit)
     if not len(motion):

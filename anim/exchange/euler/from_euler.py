@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.curves.fitting.adaptive_keys import TrackFunction, linear_keys
-from anim.errors import AnimError, RangeError
+from anim.errors import AnimError, RangeError, UnsupportedError
 from anim.exchange.euler.baked_keys import Float32Times, KeyPlacement, curves_of, is_baked
 from anim.exchange.euler.curve import Mode, travel
 from anim.exchange.euler.equal_nodes import first_equal_nodes
@@ -28,6 +28,8 @@ from anim.model.time_axis import merge_times
 from anim.model.track import share_time_axes
 
 MIN_TOLERANCE = 1e-6  # rad; the resolution of float32 quaternions
+KEYS_PER_SOURCE_KEY, MIN_KEY_LIMIT = 100, 100_000  # of all nodes: two keys can name a million turns
+FEWER_KEYS = "a larger angle tolerance needs fewer keys, and `keys` grid adds none"
 CONSTANT_TOLERANCE = 1e-9  # fraction of the skeleton's size
 
 
@@ -57,7 +59,8 @@ def from_euler(
     tolerance: rad; the maximum error of translations is tolerance × the skeleton's size, of scales tolerance × 1.
     keys: ADAPTIVE as above; GRID adds no key and ignores jumps of angles by multiples of 360°; AUTO is GRID for
     recordings: BVH, or linear curves on one even grid of 10 keys a second or more.
-    Raises RangeError for a tolerance below 1e-6 or above pi.
+    Raises RangeError for a tolerance below 1e-6 or above pi, UnsupportedError for over 100 times the source's keys, if
+    these are over 100 000.
     XYZ (0, 0, 0) at 0 s → (90°, 90°, 0) at 1 s, tolerance 0.1° → a rotation track of 15 keys
     """
     if not MIN_TOLERANCE <= tolerance <= np.pi:
@@ -92,6 +95,8 @@ class _TrackBuilder:
         self.equal: dict[int, list[int]] = {}
         for number, first in enumerate(first_equal_nodes(nodes)):
             self.equal.setdefault(first, []).append(number)
+        num_keys = sum(len(curve.values) for node in nodes for curve in curves_of(node))
+        self._limit = self._left = max(KEYS_PER_SOURCE_KEY * num_keys, MIN_KEY_LIMIT)
         self._nodes = nodes
         self._size = size
         self._units = {"translation": size, "rotation": 1.0, "scale": 1.0}
@@ -100,7 +105,7 @@ class _TrackBuilder:
 
     def add(self, nodes: Mapping[int, EulerNode], tolerance: float, *, sampled: Collection[int]) -> None:
         """Add the tracks of nodes and of those that move alike. tolerance: rad. sampled: without added keys."""
-        found = fit_nodes(nodes, tolerance, self._units, sampled=sampled)
+        found = fit_nodes(nodes, tolerance, self._units, sampled=sampled, limit=self._left)
         for number, node in nodes.items():
             try:
                 for path in PATHS:
@@ -108,14 +113,22 @@ class _TrackBuilder:
                         keys = found.get((number, path)) or self._alone(
                             node, path, None if number in sampled else tolerance
                         )
+                        self._count(len(keys.times))
                         for other in self.equal[number]:
                             self._add(other, self._nodes[other], path, keys)
             except AnimError as error:
-                raise error.at(f"node '{node.name}'") from None
+                advice = FEWER_KEYS if isinstance(error, UnsupportedError) else ""
+                raise error.at(f"node '{node.name}'").advise(advice) from None
 
     def _alone(self, node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
         unit = self._units[path]
-        return fit_node(self._stored.node(node), path, None if tolerance is None else tolerance * unit)
+        allowed = None if tolerance is None else tolerance * unit
+        return fit_node(self._stored.node(node), path, allowed, self._left)
+
+    def _count(self, num_keys: int) -> None:
+        self._left -= num_keys
+        if self._left < 0:
+            raise UnsupportedError(f"the motion needs over {self._limit} keys")
 
     def _add(self, number: int, node: EulerNode, path: str, keys: NodeKeys) -> None:
         """Add a track unless it is equal to the rest pose: many recorders write six channels for every joint."""
@@ -130,10 +143,11 @@ class _TrackBuilder:
         self.tracks.append(Track(number, path, keys.interpolation, axis, keys.values))
 
 
-def fit_node(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
+def fit_node(node: EulerNode, path: str, tolerance: float | None, limit: int | None = None) -> NodeKeys:
     """Return the keys of one path of a node; tolerance, in the path's own unit: None adds no keys.
 
-    The node's times are those of float32. `fit_nodes` gives many short nodes the same ones.
+    limit: of keys; see `linear_keys`. The node's times are those of float32. `fit_nodes` gives many short nodes the
+    same keys.
     """
     curves = path_curves(node, path)
     knots = merge_times(curve.time_axis for curve in curves)
@@ -144,7 +158,7 @@ def fit_node(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
         values = motion.values(knots, False)
         values = quaternion.align_signs(values) if motion.rotation else values
         return NodeKeys(Interpolation.STEP if stepped else Interpolation.LINEAR, knots, values)
-    return NodeKeys(Interpolation.LINEAR, *linear_keys(motion, knots, tolerance=tolerance))
+    return NodeKeys(Interpolation.LINEAR, *linear_keys(motion, knots, tolerance=tolerance, limit=limit))
 
 
 def _function(node: EulerNode, path: str) -> TrackFunction:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Bools, Floats, freeze
-from anim.curves.fitting.stacked_keys import MotionStack, StackedKeys, fit_linear_keys
+from anim.curves.fitting.stacked_keys import MAX_KEYS, MotionStack, StackedKeys, fit_linear_keys
 from anim.exchange.euler.baked_keys import curves_of
 from anim.exchange.euler.motion import NO_PIVOTS, EulerNode
 from anim.exchange.euler.node_stack import PATHS, NodeStack
@@ -40,11 +40,17 @@ def divide_nodes(nodes: Sequence[EulerNode]) -> Iterator[range]:
 
 
 def fit_nodes(
-    nodes: Mapping[int, EulerNode], tolerance: float, units: Mapping[str, float], *, sampled: Collection[int] = ()
+    nodes: Mapping[int, EulerNode],
+    tolerance: float,
+    units: Mapping[str, float],
+    *,
+    sampled: Collection[int] = (),
+    limit: int = MAX_KEYS,
 ) -> dict[tuple[int, str], NodeKeys]:
     """Return keys by node and path; nodes and paths that take as long alone are omitted.
 
     tolerance: rad. units: of the tolerance by path: metres and factors per radian. sampled: nodes without added keys.
+    limit: of keys, above which a path is omitted too.
     """
     groups: dict[tuple[str, AxesConvention, bool], list[int]] = {}
     for number, node in nodes.items():
@@ -55,12 +61,14 @@ def fit_nodes(
         stack = NodeStack([nodes[number] for number in numbers])
         for path in PATHS:
             at_keys = np.array([number in sampled for number in numbers])
-            for i, keys in _path_keys(stack, path, at_keys, tolerance * units[path]):
+            for i, keys in _path_keys(stack, path, at_keys, tolerance * units[path], limit):
                 found[numbers[i], path] = keys
     return found
 
 
-def _path_keys(stack: NodeStack, path: str, sampled: Bools, tolerance: float) -> Iterator[tuple[int, NodeKeys]]:
+def _path_keys(
+    stack: NodeStack, path: str, sampled: Bools, tolerance: float, limit: int
+) -> Iterator[tuple[int, NodeKeys]]:
     """Yield the keys of one path by index of the node; sampled: (M,) True for nodes without added keys."""
     node, knots = stack.knots(path)
     stepped = stack.is_stepped(path)
@@ -76,7 +84,7 @@ def _path_keys(stack: NodeStack, path: str, sampled: Bools, tolerance: float) ->
             rotation=path == "rotation",
             travel=stack.travel if path == "rotation" else None,
         )
-        keys = fit_linear_keys(motions, node[~at_knots], knots[~at_knots], tolerance=tolerance)
+        keys = fit_linear_keys(motions, node[~at_knots], knots[~at_knots], tolerance=tolerance, most=limit)
         yield from _by_node(keys, stepped)
 
 

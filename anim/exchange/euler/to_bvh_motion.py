@@ -24,7 +24,7 @@ from anim.model.skeleton import nearest_ancestors
 from anim.sampling import rest_pose, rest_world, sample_pose, world_matrices
 from anim.sampling.times import check_duration, check_fps
 from anim.sampling.world import world_rotations
-from anim.units import format_number
+from anim.units import format_number, list_some
 
 GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
@@ -204,7 +204,7 @@ def _names(skeleton: Skeleton) -> list[str]:
 
 def _rename_nodes(skeleton: Skeleton, names: Sequence[str], chosen: Collection[int]) -> tuple[str, ...]:
     changed = [names[node] for node in sorted(chosen) if set(skeleton.names[node]) & set(BRACES)]
-    return (f"braces in names became parentheses: {', '.join(changed)}",) if changed else ()
+    return (f"braces in names became parentheses: {list_some(changed)}",) if changed else ()
 
 
 def _shift_start(clip: Clip) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from anim.exchange.formats.labels import unique
 from anim.exchange.formats.text import decode_text
 from anim.maths.euler import AxesConvention
 from anim.model import TimeAxis
+from anim.units import list_some
 
 
 class BvhPosition(StrEnum):
@@ -46,7 +47,7 @@ def read(data: bytes, *, position: BvhPosition = BvhPosition.REPLACE) -> EulerMo
         last = first + len(joint.channels)
         nodes.append(_node(joint, name, axis, found.rows[:, first:last], position))
         first = last
-    notes = found.notes + ((f"names that appear twice got numbers: {', '.join(renamed)}",) if renamed else ())
+    notes = found.notes + ((f"names that appear twice got numbers: {list_some(renamed)}",) if renamed else ())
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
 

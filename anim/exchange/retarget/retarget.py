@@ -10,7 +10,13 @@ from functools import partial
 import numpy as np
 
 from anim.arrays import Floats, Ints, unique_sorted
-from anim.curves.fitting.adaptive_keys import refine, rotation_segment_count, sample_times, vector_segment_count
+from anim.curves.fitting.adaptive_keys import (
+    SegmentCount,
+    refine,
+    rotation_segment_count,
+    sample_times,
+    vector_segment_count,
+)
 from anim.errors import NotFoundError, UnsupportedError
 from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.retarget.ground_contact import find_soles, ground_offset, has_feet, with_descendants
@@ -27,6 +33,7 @@ MAX_CONTACT_DURATION_S = 86_400.0  # limit of a motion sampled for contacts, 30 
 CONSTANT_TOLERANCE = 1e-7  # rad, factor, and fraction of the target's size: rounding of a constant
 CONTACT_STEP_S = 1 / 30  # s, maximum step between times at which soles are sampled
 NUM_SAMPLES = 7  # inside a segment, of the error of keys
+BLOCK_MATRICES = 200_000  # of all nodes and samples of segments that are counted together: 60 MB
 
 
 class GroundMode(StrEnum):
@@ -116,7 +123,10 @@ def retarget(
 
     if source.tolerance is not None:
         units = _metres_per_unit(follow)
-        times = refine(times, partial(_segment_count, at, units=units, size=size, tolerance=source.tolerance))
+        count = partial(_segment_count, at, units=units, size=size, tolerance=source.tolerance)
+        num_nodes = len(source.skeleton) + len(target.skeleton)
+        block = max(BLOCK_MATRICES // (NUM_SAMPLES * num_nodes), 1)
+        times = refine(times, partial(_count_in_blocks, count, block))
     inside = at(inside_interval(knots)) if len(before) else None
     wanted = _RequiredKeys(times, at(times), before, knots, inside, thin=source.tolerance is not None)
     clip = Clip(source.clip.name, tuple(_tracks(follow, wanted, size)))
@@ -151,6 +161,11 @@ def _metres_per_unit(follow: PoseTransfer) -> dict[int, float]:
     world = rest_world(skeleton)
     lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
     return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
+
+
+def _count_in_blocks(count: SegmentCount, block: int, a: Floats, b: Floats) -> Ints:
+    """The numbers (B,) that `count` gives, `block` segments at a time: memory is that of the poses of one block."""
+    return np.concatenate([count(a[i : i + block], b[i : i + block]) for i in range(0, len(a), block)])
 
 
 def _segment_count(

@@ -22,7 +22,7 @@ from anim.show.page.embedded_references import drop_references
 from anim.show.page.embedded_tracks import resolve_pointers, rewrite_tracks
 from anim.show.page.packing import Packing
 from anim.show.page.sticks import add_sticks
-from anim.units import plural
+from anim.units import list_some, plural
 
 UNLIT = "KHR_materials_unlit"  # three.js fails on it where the file does not name it
 MAX_INFLUENCES = 4  # per vertex in three.js
@@ -131,7 +131,7 @@ def _name_extensions(json: Json) -> list[str]:
     for key in ("extensionsUsed", "extensionsRequired"):
         if DRACO in json.get(key, ()):
             json[key] = [name for name in json[key] if name != DRACO]
-    return [f"shown without {', '.join(unknown)}, which the file requires"] if unknown else []
+    return [f"shown without {list_some(unknown)}, which the file requires"] if unknown else []
 
 
 def _is_unlit(material: Any) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,7 +16,7 @@ from anim.gltf.document import Document, json_array
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.inspect import frame_rate
-from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind
+from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind, parse_weight_pointer
 from anim.operations.selection import Selection
 from anim.show.plots import polylines
 from anim.show.plots.moving_tracks import are_moving
@@ -231,13 +230,14 @@ def _euler_labels(order: str) -> tuple[str, ...]:
 def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
     """Names of morph weights, by the target's name or index; none for other tracks."""
     pointer = f"/nodes/{track.node}/weights" if track.path == "weights" else track.pointer or ""
-    whole = re.fullmatch(r"(/(?:nodes|meshes)/\d+/weights)(?:/(\d+))?", pointer)
-    if whole is None:
+    found = parse_weight_pointer(pointer)
+    if found is None:
         return ()
-    names, count = targets.get(whole[1], ()), track.values.shape[1]
-    if whole[2] is not None:
-        number = int(whole[2])
-        return (_printable_name(names[number]) if number < len(names) else f"target {number}",)
+    names, count = targets.get(f"/{found.owner}/{found.owner_index}/weights", ()), track.values.shape[1]
+    if found.target is not None:
+        if count > 1:  # of an invalid file: values of another width
+            return ()
+        return (_printable_name(names[found.target]) if found.target < len(names) else f"target {found.target}",)
     if len(names) == count:
         return _shorten([_printable_name(name) for name in names])
     return tuple(f"target {i}" for i in range(count))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError, UnstableError
+from anim.errors import DataRangeError, RangeError, UnstableError
 from anim.gltf.document import Document
 from anim.model import Clip, Scene
 from anim.model.point_cache import PointCache
@@ -55,7 +55,9 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
     start = 0.0 if options.loop else -options.warm_up
     births = emit(scene, clip, emitter, start, options.duration, options.seed, options.start)
     if not len(births):
-        raise RangeError("no particle is emitted", help="raise the rate, the burst or the duration")
+        raise RangeError(
+            f"no particle is emitted in {options.duration:g} s", help="raise the rate, the burst or the duration"
+        )
     _check_speed(births)
     num_emitted = len(births)
     if options.loop:
@@ -92,12 +94,12 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
 
 
 def _check_speed(births: Births) -> None:
-    """Raise RangeError for particles that no run allows at birth: the emitter's own speed, whatever the step."""
+    """Raise DataRangeError for particles that no run allows at birth: the emitter's own speed, whatever the step."""
     from anim.simulation.particles.kernels.particle_run import MAX_SPEED_M_S
 
     speed = float(np.linalg.norm(births.velocities, axis=1).max())
     if speed >= MAX_SPEED_M_S:
-        raise RangeError(
+        raise DataRangeError(
             f"a particle is born at {speed:g} m/s, mostly the speed of its emitter (limit {MAX_SPEED_M_S:g} m/s)",
             help="lower `inherit`: with 0 particles don't inherit the emitter's speed",
         )

@@ -89,6 +89,8 @@ def simulate_springs(
     if options.scale_aware:
         bones = scale_bones(skeleton, bones)
     duration = clip.end - clip.start if options.duration is None else options.duration
+    if options.duration is None and not duration > 0:
+        raise RangeError("has no clip with a length", help="choose `duration`")
     steps, looped, motion = _run(skeleton, _from_zero(clip), bones, options, duration)
     frames = frame_times(0.0, duration, fps=options.fps)
     frames = frames[distinct_float32(frames)]
@@ -151,10 +153,7 @@ def _run(
     """The steps, and the motion at each of them, from 0 s to the first at or after the duration."""
     check_number(duration, "duration")
     if not duration > 0:
-        raise RangeError(
-            f"`duration` is {duration:g} s (expected more than 0)",
-            help="choose `duration`, since no clip has a length",
-        )
+        raise RangeError(f"`duration` is {duration:g} s (expected more than 0)")
     steps = Steps(options.step, duration, options.warm_up)
     if options.loop:
         num_steps = max(round(duration / options.step), MIN_LOOP_STEPS)

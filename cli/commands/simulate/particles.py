@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import PurePath
@@ -10,7 +11,7 @@ from typing import Annotated
 import typer
 
 from anim.caches.points import POINT_FORMATS, encode_points
-from anim.errors import UnsupportedError
+from anim.errors import DataRangeError, UnsupportedError
 from anim.gltf.document import Document
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
@@ -202,11 +203,10 @@ def command(
             end,
         )
         seconds = duration if duration is not None else driver.end - driver.start or 2.0
-        radius = units.parse_length(size, "--size", lambda: diagonal(scene))
         chosen = replace(
             options,
             duration=seconds,
-            size=radius,
+            size=_radius(size, scene),
             start=driver.start,
             obstacles=(
                 *([] if floor is None else [Floor(floor)]),
@@ -257,6 +257,15 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
     if has_nodes and "max_error_m" in figures:
         parts.append(f"{figures['keys']} keys with an error of {text.format_length(figures['max_error_m'])}")
     return ", ".join(parts)
+
+
+def _radius(size: str, scene: Scene) -> float:
+    """Radius of a particle in m. Raises DataRangeError for a model that has no size, or one beyond all numbers."""
+    radius = units.parse_length(size, "--size", lambda: diagonal(scene))
+    if not 0 < radius < math.inf:
+        problem = f"{size} of the model, which is {diagonal(scene):.3g} m large, is no radius of a particle"
+        raise DataRangeError(problem, help="choose --size, such as 2cm")
+    return radius
 
 
 def _rigid_colliders(document: Document, scene: Scene, reporter: Reporter) -> list[Obstacle]:

@@ -39,6 +39,11 @@ def crashed() -> Iterator[int]:
     os.abort()
 
 
+def crashed_with(size: int) -> Iterator[int]:
+    yield len(np.ones(size, np.uint8))
+    os.abort()
+
+
 def wrong() -> Iterator[int]:
     yield 1
     raise KeyError("of ours")
@@ -87,6 +92,20 @@ def test_errors_of_ours_pass() -> None:
 def test_a_child_that_ends_is_an_error() -> None:
     with pytest.raises(ChildEndedError):
         taken(crashed)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell the memory of a child")
+def test_a_child_that_ends_tells_its_memory() -> None:
+    """The figure of a child starts with that of its parent, so only a larger one is its own."""
+    resource = pytest.importorskip("resource")
+    own = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peaks = []
+    for size in (1, own + GB // 5):
+        with pytest.raises(ChildEndedError) as caught, run_in_child(crashed_with, size, limit_bytes=own + GB) as each:
+            list(each)
+        peaks.append(caught.value.peak_bytes)
+    assert peaks[0] == 0
+    assert own + GB // 5 < peaks[1] < own + GB
 
 
 def test_other_errors_have_their_traceback() -> None:

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation, Slerp
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import DataRangeError
 from anim.maths import quaternion as quat
 
 HALF = np.sqrt(0.5)
@@ -110,7 +110,7 @@ def test_nlerp_leaves_slerp_by_the_published_amount(degrees: float, off: float) 
 
 def test_normalize() -> None:
     np.testing.assert_array_equal(quat.normalize(np.array([0, 0, 0, -2.0])), [0, 0, 0, -1])
-    with pytest.raises(RangeError, match="length 0"):
+    with pytest.raises(DataRangeError, match="length 0"):
         quat.normalize(np.zeros((2, 4)))
 
 

@@ -53,6 +53,15 @@ def test_a_name_that_is_written_exactly_comes_before_globs() -> None:
     assert Selection(clips=["a*", "Run?"]).chosen_clips(names) == [1, 2]
 
 
+def test_an_index_comes_before_a_clip_that_is_called_like_it() -> None:
+    """'#0' chose both, so that no text chose clip 0 alone."""
+    names = ["a", "b", "#0"]
+    assert Selection(clips=["#0"]).chosen_clips(names) == [0]
+    assert Selection(clips=["#2"]).chosen_clips(names) == [2]
+    assert Selection(clips=["[#]0"]).chosen_clips(names) == [2]
+    assert Selection(clips=["#9"]).chosen_clips(["a", "#9"]) == [1]
+
+
 def test_what_is_near_is_suggested() -> None:
     with pytest.raises(NotFoundError, match="no clip matches 'wlak'") as caught:
         Selection(clips=["wlak"]).chosen_clips(CLIPS)

@@ -8,7 +8,7 @@ import pytest
 from anim.arrays import Floats, Ints
 from anim.curves.fitting import adaptive_keys
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, linear_keys, refine, segment_count
-from anim.errors import RangeError
+from anim.errors import UnsupportedError
 from anim.maths import quaternion
 from anim.model import Track
 
@@ -68,7 +68,7 @@ def test_segments_are_counted_by_the_root_of_their_error() -> None:
 
 def test_too_many_keys_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(adaptive_keys, "MAX_KEYS", 100)
-    with pytest.raises(RangeError, match="over 100 keys"):
+    with pytest.raises(UnsupportedError, match="over 100 keys"):
         refine(ENDS, lambda a, b: np.full(len(a), 8))
 
 

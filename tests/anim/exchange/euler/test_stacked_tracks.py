@@ -80,9 +80,9 @@ def test_long_motions_are_left_to_be_fitted_alone(monkeypatch: pytest.MonkeyPatc
     counted = []
     alone = conversion.fit_node
 
-    def called(node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
+    def called(node: EulerNode, path: str, tolerance: float | None, limit: int | None = None) -> NodeKeys:
         counted.append(node.name)
-        return alone(node, path, tolerance)
+        return alone(node, path, tolerance, limit)
 
     monkeypatch.setattr(conversion, "fit_node", called)
     monkeypatch.setattr(fitting, "MAX_STACK_KEYS", 100)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anim.errors import RangeError
+from anim.errors import DataRangeError
 from anim.model import Scene
 from anim.simulation.particles.emission import Births, Emitter, emit
 from anim.simulation.particles.options import ParticleOptions
@@ -40,7 +40,9 @@ def test_an_emitter_faster_than_any_particle_is_refused_whatever_the_step() -> N
     played = clip(track("translation", [0, 1], np.array([[0.0, 0, 0], [2e5, 0, 0]])))
     scene = Scene(skeleton([-1, 0]), ())
     options = ParticleOptions(duration=0.1)
-    with pytest.raises(RangeError, match="a particle is born at 200000 m/s, mostly the speed of its emitter") as found:
+    with pytest.raises(
+        DataRangeError, match="a particle is born at 200000 m/s, mostly the speed of its emitter"
+    ) as found:
         simulate_particles(scene, played, Emitter((1,), rate=20, speed=1.0), options)
     assert "lower `inherit`" in found.value.help
     run = simulate_particles(scene, played, Emitter((1,), rate=20, speed=1.0, inherit=0.0), options)

@@ -134,7 +134,7 @@ def test_a_loop_that_never_settles_is_blended() -> None:
 def test_the_rest_pose_drives_without_a_clip() -> None:
     result = simulate_springs(CHAIN, Clip("drop", ()), BONES, SpringOptions(duration=1.0))
     assert [track.target for track in result.clip.tracks] == [(1, "rotation"), (2, "rotation")]
-    with pytest.raises(RangeError, match="`duration` is 0 s"):
+    with pytest.raises(RangeError, match="has no clip with a length"):
         simulate_springs(CHAIN, Clip("", ()), BONES)
 
 
