@@ -36,7 +36,7 @@ class LazyBatch:
 
     @property
     def is_cubic(self) -> bool:
-        """Whether the tracks have tangents."""
+        """True for tracks with tangents."""
         return self.tracks[0].interpolation is Interpolation.CUBICSPLINE
 
     @property

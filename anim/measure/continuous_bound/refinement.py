@@ -9,7 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.measure.continuous_bound.subintervals import Subintervals
-from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
+from anim.measure.error.displacement import CHUNK, DisplacementField
+from anim.measure.error.max_displacement import lengths
 from anim.measure.error.metric import MAX_SEARCHED, ErrorMetric
 from anim.measure.error.point_groups import PointGroups
 from anim.measure.error.posed_clips import AskedTimes, has_weights

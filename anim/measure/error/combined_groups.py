@@ -9,7 +9,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
+from anim.measure.error.displacement import BoundGroups, DisplacementField, SkinnedDisplacement
+from anim.measure.error.max_displacement import MaxDisplacement
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.shell_points import ShellPoints
 from anim.sampling.pose import PosedSkeleton

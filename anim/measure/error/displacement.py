@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from anim.arrays import Floats, Ints
 
 CHUNK = 1_000_000  # vertices × frames per step: 24 MB
 MAX_GROUP_VALUES = 250_000  # of the same, of one group with many vertices
-MAX_SINGLE = 1e15  # m, of terms in float32: their squares, and sums of squares, are finite
-MAX_TERM_RATIO = 20.0  # of the largest term of a vector to the longest vector; beyond it float32 loses digits
-FIRST = 8  # frames evaluated before the bounds of the others are updated
 
 
 class DisplacementField(Protocol):
@@ -100,9 +97,9 @@ class SkinnedDisplacement:
         products = self._groups.products[group]
         count = len(products) * len(frames) // MAX_GROUP_VALUES + 1
         if count == 1:
-            return _lengths(self._products(products, group, frames))
+            return vector_lengths(self._products(products, group, frames))
         parts = np.array_split(products, count)
-        return np.concatenate([_lengths(self._products(part, group, frames)) for part in parts])
+        return np.concatenate([vector_lengths(self._products(part, group, frames)) for part in parts])
 
     def _products(self, products: Floats, group: int, frames: Ints) -> Floats:
         """The vectors (V, 3, f) of some of a group's vertices, by their products."""
@@ -204,90 +201,13 @@ class DisplacementRate:
         return self._field.joint(group, frame + 1, vertex)
 
 
-class MaxDisplacement(NamedTuple):
-    """The longest vector of a field. vertex: index in the group, −1 if only the bound was evaluated.
-
-    limits: (G, F), the field's own; where vertices were evaluated, at most the longest of them.
-    """
-
-    length: float
-    group: int
-    frame: int
-    vertex: int
-    limits: Floats
-
-
-def lengths(field: DisplacementField, group: int, frames: Ints) -> Floats:
-    """Return the lengths (V_g, f) of the vectors of a group's vertices in some frames."""
-    if isinstance(field, SkinnedDisplacement):
-        return field.lengths(group, frames)
-    return _lengths(field.vectors(group, frames))
-
-
-def _lengths(vectors: Floats) -> Floats:
-    """Lengths (V, f) of vectors (V, 3, f), which are overwritten."""
+def vector_lengths(vectors: Floats) -> Floats:
+    """Return the lengths (V, f) of vectors (V, 3, f), which are overwritten."""
     vectors *= vectors
     squares = vectors[:, 0]  # added one by one, in half of the time of a sum over three
     squares += vectors[:, 1]
     squares += vectors[:, 2]
     return np.asarray(np.sqrt(squares, out=squares))
-
-
-def lengths_by_group(field: DisplacementField, groups: int, frames: Ints) -> list[Floats]:
-    """Return the lengths of the vectors of all groups in some frames, in the order of groups, vertices, frames: flat.
-
-    Skinned ones are computed in float32, in half of the time, where the longest is right to about a millionth there:
-    not if terms cancel, as those of a model far from the origin do.
-    """
-    if isinstance(field, SkinnedDisplacement):
-        single, largest = field.in_single_precision()
-        if largest < MAX_SINGLE:
-            found = _flat_lengths(single, groups, frames)
-            longest = max((float(each.max(initial=0.0)) for each in found), default=0.0)
-            if largest <= MAX_TERM_RATIO * longest:
-                return found
-    return _flat_lengths(field, groups, frames)
-
-
-def _flat_lengths(field: DisplacementField, groups: int, frames: Ints) -> list[Floats]:
-    if isinstance(field, SkinnedDisplacement) and (found := field.uniform_vectors(frames)) is not None:
-        found *= found
-        return [np.sqrt(found.sum(axis=2)).reshape(-1)]
-    return [lengths(field, group, frames).reshape(-1) for group in range(groups)]
-
-
-def max_displacement(field: DisplacementField, *, floor: float, slack: float, most: int) -> MaxDisplacement:
-    """Return the longest vector: a bound that is at most `slack` times or `floor` above its length.
-
-    floor: groups with smaller bounds are not searched. slack: ≥ 1. most: vertices × frames that are evaluated; if there
-    are more, the bound of the rest is returned.
-    """
-    tops = field.limits.max(axis=1)
-    group = int(tops.argmax())
-    found = MaxDisplacement(0.0, group, int(field.limits[group].argmax()), -1, field.limits.copy())
-    left = 0.0  # the largest bound of groups that were not evaluated
-    for group in np.argsort(-tops, kind="stable").tolist():
-        if tops[group] <= max(found.length * slack, floor) or most <= 0:
-            left = max(left, float(tops[group]))  # those of the groups that follow are no larger
-            break
-        limits = field.limits[group]
-        waiting = np.argsort(-limits, kind="stable")
-        size = FIRST
-        while len(waiting):
-            at_most = float(limits[waiting[0]])
-            if at_most <= max(found.length * slack, floor) or most <= 0:
-                left = max(left, at_most)
-                break
-            frames, waiting = waiting[:size], waiting[size:]
-            lengths_here = lengths(field, group, frames)
-            found.limits[group, frames] = lengths_here.max(axis=0)
-            vertex, column = np.unravel_index(int(lengths_here.argmax()), lengths_here.shape)
-            if lengths_here[vertex, column] > found.length:
-                length = float(lengths_here[vertex, column])
-                found = MaxDisplacement(length, group, int(frames[column]), int(vertex), found.limits)
-            most -= lengths_here.size
-            size = max(min(2 * size, CHUNK // max(len(lengths_here), 1)), 1)
-    return found if left <= found.length else found._replace(length=left)
 
 
 def _by_group(bounds: Floats, reach: Sequence[Ints]) -> Floats:

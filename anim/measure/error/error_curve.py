@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats
-from anim.measure.error.displacement import CHUNK, DisplacementField, lengths
+from anim.measure.error.displacement import CHUNK, DisplacementField
+from anim.measure.error.max_displacement import lengths
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import FPS, dense_times
 from anim.model import Clip

@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.displacement import MaxDisplacement
+from anim.measure.error.max_displacement import MaxDisplacement
 from anim.measure.error.point_groups import Binding, SkinnedGroups
 from anim.measure.error.reduced_skeleton import IDENTITY, ReducedSkeleton
 from anim.measure.error.surface import Surface

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
-from anim.measure.error.displacement import max_displacement
+from anim.measure.error.max_displacement import max_displacement
 from anim.measure.error.merged_groups import merge_points, merge_surfaces
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error

@@ -14,13 +14,8 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
-from anim.measure.error.displacement import (
-    BoundGroups,
-    DisplacementField,
-    MaxDisplacement,
-    MorphedDisplacement,
-    SkinnedDisplacement,
-)
+from anim.measure.error.displacement import BoundGroups, DisplacementField, MorphedDisplacement, SkinnedDisplacement
+from anim.measure.error.max_displacement import MaxDisplacement
 from anim.measure.error.morph_bounds import SIDES, Change, MorphBounds
 from anim.measure.error.surface import Surface, morph_points, skin_points
 from anim.model import Pose

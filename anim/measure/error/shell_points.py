@@ -8,7 +8,8 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hierarchy
-from anim.measure.error.displacement import BoundGroups, DisplacementField, MaxDisplacement, SkinnedDisplacement
+from anim.measure.error.displacement import BoundGroups, DisplacementField, SkinnedDisplacement
+from anim.measure.error.max_displacement import MaxDisplacement
 from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.surface import NUM_CORNERS, Surface, node_cubes
 from anim.model import Scene, Skeleton

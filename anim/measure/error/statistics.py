@@ -9,7 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.maths import hierarchy, quaternion
-from anim.measure.error.displacement import lengths_by_group, max_displacement
+from anim.measure.error.max_displacement import lengths_by_group, max_displacement
 from anim.measure.error.merged_groups import MergedGroups
 from anim.measure.error.metric import MAX_SEARCHED, Block, ErrorMetric
 from anim.measure.error.point_groups import PointGroups

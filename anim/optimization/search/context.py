@@ -47,7 +47,7 @@ class Context:
 
     @property
     def is_measurable(self) -> bool:
-        """Whether bounds are finite, and all coordinates small enough for their squares in float32."""
+        """True where bounds are finite, and all coordinates small enough for their squares in float32."""
         most = max(np.abs(part).max(initial=0.0) for part in (self.rest_world, self.points.factors))
         return bool(most < MAX_COORDINATE_M) and bool(np.isfinite((self.size, self.bounds.max_error)).all())
 

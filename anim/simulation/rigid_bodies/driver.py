@@ -9,6 +9,7 @@ from anim.maths import matrix
 from anim.model import Clip, Skeleton
 from anim.sampling.pose import PoseSampler
 from anim.sampling.world import world_matrices
+from anim.simulation.rigid_bodies.distances import check_animated
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from anim.simulation.steps import Steps
 
@@ -22,6 +23,7 @@ class AnimatedBodies:
         """clip: begins at 0 s; step n is at n steps."""
         self.bodies = rigid.animated
         self._skeleton = skeleton
+        self._rigid = rigid
         self._sampler = PoseSampler(skeleton, clip)
         self._nodes = [rigid.bodies[i].node for i in self.bodies]
         self._step = steps.step_s
@@ -29,7 +31,10 @@ class AnimatedBodies:
         self._positions, self._rotations = np.empty((1, 0, 3)), np.empty((1, 0, 4))
 
     def at(self, index: int) -> tuple[Floats, Floats]:
-        """Return positions (n, 3) and rotations (n, 4) of the bodies at a step."""
+        """Return positions (n, 3) and rotations (n, 4) of the bodies at a step.
+
+        Raises UnsupportedError for a body too far away to be simulated.
+        """
         if not self._nodes:
             return self._positions[0], self._rotations[0]
         if not self._begin <= index < self._end:
@@ -37,4 +42,5 @@ class AnimatedBodies:
             times = np.arange(self._begin, self._end, dtype=np.float64) * self._step
             world = world_matrices(self._skeleton, self._sampler.at(times))[:, self._nodes]
             self._positions, self._rotations, _, _ = matrix.decompose(world)
+            check_animated(self._positions, self._rigid, self._skeleton)
         return self._positions[index - self._begin], self._rotations[index - self._begin]

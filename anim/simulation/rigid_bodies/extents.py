@@ -48,6 +48,12 @@ def center_in_scene(body: RigidBody) -> Floats:
     return np.asarray(body.frame.position + quaternion.rotate(body.frame.rotation, body_extent(body).center))
 
 
+def scene_center(scene: RigidScene) -> Floats:
+    """Return the mean position (3,) m of the moving bodies at the start."""
+    centers = [center_in_scene(scene.bodies[i]) for i in scene.moving]
+    return np.asarray(np.mean(centers, axis=0)) if centers else np.zeros(3)
+
+
 def smallest_radius(scene: RigidScene, default: float) -> float:
     """Return the radius of the smallest moving body with a shape, in metres; `default` if there is none."""
     radii = [body_extent(scene.bodies[i]).radius for i in scene.moving]

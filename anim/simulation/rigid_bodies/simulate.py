@@ -17,7 +17,7 @@ from anim.operations.retime import shift_time
 from anim.sampling.pose import sample_pose
 from anim.sampling.world import world_matrices
 from anim.simulation.report import SimulationReport
-from anim.simulation.rigid_bodies import tracks
+from anim.simulation.rigid_bodies import distances, tracks
 from anim.simulation.rigid_bodies.assembly import assemble
 from anim.simulation.rigid_bodies.description import PhysicsDescription
 from anim.simulation.rigid_bodies.khr_reader import read_khr
@@ -54,7 +54,8 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     """Return the tracks of all bodies, from the start of the clip on.
 
     Raises UnstableError with a report for a run that diverges, RangeError without a body, or for a loop of bodies that
-    nothing moves again, UnsupportedError for more steps than the limit of memory allows, or bodies in each other.
+    nothing moves again, UnsupportedError for more steps than the limit of memory allows, or bodies in each other or
+    too far apart.
     """
     skeleton, start = scene.skeleton, clip.start
     clip = Clip(clip.name, tuple(shift_time(track, -start) for track in clip.tracks))
@@ -67,6 +68,7 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
             "`loop` needs a clip or motor that moves bodies: those that only fall don't come back",
             help=("leave it out: players repeat any clip"),
         )
+    distances.check_start(rigid, skeleton)
     check_overlaps(rigid)
     rounds = MAX_ROUNDS if options.loop else 1
     count = len(rigid.moving)
@@ -74,12 +76,13 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     steps.check_memory(f"{count} moving bodies", fps=options.fps, **sizes)
     try:
         motion = run_scene(rigid, skeleton, clip, steps, substeps=substeps, max_rounds=rounds)
+        errors = _step_errors(rigid, skeleton, clip, motion, steps, options, substeps)
     except UnstableError as error:
         recorder = error.report
         assert isinstance(recorder, Recorder)
-        found = make_report(rigid, recorder.motion(), options, steps, first_bad_step=recorder.num_states)
+        run = Steps(recorder.step_s, options.duration, options.warm_up)  # this one, or that with half the step
+        found = make_report(rigid, recorder.motion(), options, run, first_bad_step=recorder.num_states)
         raise error.with_report(found) from None
-    errors = _step_errors(rigid, skeleton, clip, motion, steps, options, substeps)
     seam = None
     if options.loop:
         motion, seam = close_loop(motion, options.duration)

@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from anim.arrays import Floats
 from anim.simulation.rigid_bodies.description import JointDrive, JointLimit, Motion, Vector
-from anim.simulation.rigid_bodies.extents import center_in_scene, smallest_radius
+from anim.simulation.rigid_bodies.extents import center_in_scene, scene_center, smallest_radius
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, Frame, RigidBody, RigidJoint, RigidScene
 from anim.simulation.rigid_bodies.shapes import ScaledShapes
 
@@ -41,12 +40,6 @@ def plane_reach(scene: RigidScene) -> float:
     units = choose_unit(scene)
     wanted = units * max(MIN_PLANE_REACH_M, PLANE_REACH_PER_SPREAD * _spread(scene))
     return min(wanted, MAX_PLANE_REACH_UNITS) / units
-
-
-def scene_center(scene: RigidScene) -> Floats:
-    """Return the mean position (3,) m of the moving bodies at the start."""
-    centers = [center_in_scene(scene.bodies[i]) for i in scene.moving]
-    return np.asarray(np.mean(centers, axis=0)) if centers else np.zeros(3)
 
 
 def _spread(scene: RigidScene) -> float:

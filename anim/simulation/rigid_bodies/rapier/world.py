@@ -15,12 +15,12 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.simulation.rigid_bodies.description import MAX_SPEED_M_S
-from anim.simulation.rigid_bodies.extents import body_extent, smallest_radius
+from anim.simulation.rigid_bodies.extents import body_extent, scene_center, smallest_radius
 from anim.simulation.rigid_bodies.rapier.filters import interaction_groups
 from anim.simulation.rigid_bodies.rapier.frames import isometry, shape_frame
 from anim.simulation.rigid_bodies.rapier.friction import FrictionHooks
 from anim.simulation.rigid_bodies.rapier.joints import build_joint, find_approximations
-from anim.simulation.rigid_bodies.rapier.length_unit import choose_unit, plane_reach, scale_scene, scene_center
+from anim.simulation.rigid_bodies.rapier.length_unit import choose_unit, plane_reach, scale_scene
 from anim.simulation.rigid_bodies.rapier.package import load_package
 from anim.simulation.rigid_bodies.rapier.shapes import INFINITE_MASS_KG, ShapeBuilder
 from anim.simulation.rigid_bodies.rapier.slip import SlipReader

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.measure.error.combined_groups import combine_groups
-from anim.measure.error.displacement import MaxDisplacement
+from anim.measure.error.max_displacement import MaxDisplacement
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.orientation_probes import shell_points
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups

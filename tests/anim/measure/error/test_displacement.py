@@ -7,14 +7,8 @@ import pytest
 
 from anim.arrays import Floats
 from anim.maths import quaternion
-from anim.measure.error.displacement import (
-    BoundGroups,
-    DisplacementRate,
-    SkinnedDisplacement,
-    lengths,
-    lengths_by_group,
-    max_displacement,
-)
+from anim.measure.error.displacement import BoundGroups, DisplacementRate, SkinnedDisplacement
+from anim.measure.error.max_displacement import lengths, lengths_by_group, max_displacement
 
 RNG = np.random.default_rng(5)
 JOINTS, FRAMES, VERTICES = 4, 40, 30

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from anim.sampling.track import sample as sample_track
 from anim.simulation.rigid_bodies.description import Material, Shape
 from anim.simulation.rigid_bodies.node_globs import ChosenNodes, add_chosen
 from anim.simulation.rigid_bodies.options import RigidOptions
+from anim.simulation.rigid_bodies.rapier.world import RapierWorld
 from anim.simulation.rigid_bodies.simulate import (
     add_rigid_motion,
     read_description,
@@ -176,6 +178,17 @@ def test_a_run_that_diverges_has_a_report() -> None:
     report = error.value.report
     assert (report.kind, report.first_bad_step) == ("rigid", 1)
     assert report.advice.endswith("--step 1/480")
+
+
+def test_a_run_whose_half_step_diverges_has_the_report_of_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    failures = chain(repeat(False, 6), repeat(True))
+    monkeypatch.setattr(RapierWorld, "has_failed", lambda _: next(failures))
+    made = document([node((0, 1, 0), **FALLING)], BALL)
+    with pytest.raises(UnstableError, match="diverges in step 1") as error:
+        simulate(made, duration=0.1, step=1 / 60, estimate_error=True)
+    report = error.value.report
+    assert (report.step_s, report.first_bad_step) == (1 / 120, 1)
+    assert report.advice.endswith("--step 1/240")
 
 
 def test_the_report_states_energy_drift_and_the_error_of_the_step() -> None:
