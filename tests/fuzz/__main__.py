@@ -49,7 +49,11 @@ def main() -> int:
         warm(family)
     end = time.monotonic() + given.seconds
     count = given.count
-    for name, batch in swept_batches(families) if given.sweep else batches(families, given.seed, given.first, count):
+    for name, batch in (
+        swept_batches(families, given.first, count)
+        if given.sweep
+        else batches(families, given.seed, given.first, count)
+    ):
         if time.monotonic() > end:
             break
         run_batch(name, batch, faults, done, given.keep)
@@ -93,10 +97,10 @@ def batches(families: Sequence[str], seed: int, first: int, count: int) -> Itera
             yield f"{family} {seed}", dict(zip(numbers, jobs(family, seed, numbers), strict=True))
 
 
-def swept_batches(families: Sequence[str]) -> Iterator[tuple[str, dict[int, Job]]]:
+def swept_batches(families: Sequence[str], first: int, count: int) -> Iterator[tuple[str, dict[int, Job]]]:
     """Yield family and "sweep", and some of the jobs of its sweep by number."""
     for family in families:
-        every = enumerate(sweep_jobs(family))
+        every = itertools.islice(enumerate(sweep_jobs(family)), first, first + count)
         while batch := dict(itertools.islice(every, BATCH)):
             yield f"{family} sweep", batch
 
