@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import operator
-import re
 from collections.abc import Iterator, Sequence
 from typing import overload
 
 from anim.errors import NotFoundError, ShapeError
 from anim.gltf.reading import reader
 from anim.model import Clip
-from anim.operations.selection import not_found
+from anim.operations.selection import not_found, parse_index
 from anim.units import list_some
 
 
@@ -29,8 +28,9 @@ class Clips:
         """Return the index of a clip by name or index. Raises NotFoundError, with similar names."""
         if not isinstance(key, str):
             return self._checked(key)
-        if re.fullmatch(r"#[0-9]{1,9}", key) and int(key[1:]) < len(self):
-            return int(key[1:])
+        index = parse_index(key, len(self))
+        if index is not None:
+            return index
         found = [i for i, name in enumerate(self.names) if name == key]
         if len(found) > 1:
             raise NotFoundError(f"{len(found)} clips are called '{key}'", help=f"take one by its index: {found}")

@@ -16,6 +16,7 @@ _ZERO_ANGLE = r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*"
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 MAX_LISTED = 8  # names in a message
+FEW = 3  # names in a message about something else
 MIN_EXPONENT_VALUE = 1e15  # more digits than a double has; 1e300 would be a line of 301
 
 
@@ -32,10 +33,10 @@ def plural(count: int, noun: str, many: str = "") -> str:
     return f"{count} {noun if count == 1 else many or noun + 's'}"
 
 
-def list_some(names: Sequence[str]) -> str:
-    """Return at most MAX_LISTED names: "a, b, c", or "a, b, c, d, e, f, g, h and 12 more"."""
-    more = len(names) - MAX_LISTED
-    return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
+def list_some(names: Sequence[str], most: int = MAX_LISTED) -> str:
+    """Return at most `most` names: "a, b, c", or with most=3 of 15 "a, b, c and 12 more"."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def parse_fraction(text: str, name: str) -> float:

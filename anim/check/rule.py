@@ -12,8 +12,8 @@ from anim.check.finding import Finding, Occurrence, Severity
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.inspect.report import ClipReport
+from anim.units import FEW, list_some
 
-MAX_LISTED_PARTS = 3  # parts of a file in one finding
 _NONE: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -101,8 +101,7 @@ def _labels(found: Sequence[Occurrence]) -> str:
     """Label of several parts: "clips 'walk', #3, 'run' and 4 more"."""
     if all(each.label.startswith("clip ") and each.pointer.startswith("/animations/") for each in found):
         return reader.clip_labels([(each.name, each.number) for each in found])
-    more = f" and {len(found) - MAX_LISTED_PARTS} more" if len(found) > MAX_LISTED_PARTS else ""
-    return ", ".join(each.label for each in found[:MAX_LISTED_PARTS]) + more
+    return list_some([each.label for each in found], FEW)
 
 
 def counted(one: str, many: str) -> Callable[[Sequence[Occurrence]], str]:

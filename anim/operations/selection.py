@@ -12,6 +12,7 @@ import numpy as np
 
 from anim.errors import NotFoundError, RangeError, ShapeError, check_type
 from anim.model import Clip, Skeleton
+from anim.units import list_some
 
 MAX_SUGGESTED = 3  # names
 
@@ -86,10 +87,17 @@ def not_found(name: str, names: Iterable[str], what: str) -> NotFoundError:
     return NotFoundError(f"no {what} matches '{name}'", help=_suggestion(name, names, what))
 
 
+def parse_index(text: str, count: int) -> int | None:
+    """Return the index that a text like "#3" is among `count` items; None for other texts, and for "#03"."""
+    is_index = re.fullmatch(r"#(0|[1-9][0-9]{0,8})", text) and int(text[1:]) < count
+    return int(text[1:]) if is_index else None
+
+
 def _matches(glob: str, names: Sequence[str]) -> set[int]:
     """The index that `glob` is, else indices of the names that are `glob` itself, otherwise of those that match it."""
-    if re.fullmatch(r"#(0|[1-9][0-9]{0,8})", glob) and int(glob[1:]) < len(names):
-        return {int(glob[1:])}
+    index = parse_index(glob, len(names))
+    if index is not None:
+        return {index}
     exact = {i for i, name in enumerate(names) if glob == name or (name == f"#{i}" and glob == str(i))}
     return exact or {i for i, name in enumerate(names) if fnmatchcase(name, glob)}
 
@@ -104,8 +112,8 @@ def _suggestion(glob: str, names: Iterable[str], what: str) -> str:
         return f"did you mean '{folded[near[0]]}'?"
     if not known:
         return f"the file has no {_plural(what)}"
-    listed = ", ".join(f"'{name}'" for name in known[:8])
-    return f"the {_plural(what)} are {listed}{f' and {len(known) - 8} more' if len(known) > 8 else ''}"
+    names = [f"'{name}'" for name in known]
+    return f"the {_plural(what)} are {list_some(names)}"
 
 
 def _in_other_case(glob: str, names: Sequence[str]) -> str:

@@ -11,7 +11,8 @@ from anim.arrays import Bools, Ints
 from anim.model import Interpolation, TimeAxis, Track
 from anim.sampling.batch import Batch, MixedBatch, Rule, rule_of, stack_values
 
-MAX_STACKED_KEYS = 1 << 18  # of the tracks of one axis; of more only those requested are stacked, call by call
+MAX_STACKED_KEYS = 1 << 18  # of the tracks of a batch; of a longer one only those requested are stacked, call by call
+MAX_MIXED_KEYS = 1 << 15  # of the tracks of an axis, of which a copy with those of other axes pays
 
 
 class LazyBatch:
@@ -26,7 +27,7 @@ class LazyBatch:
         self.tracks, self.numbers = tracks, numbers
         self.time_axis = (stacked or tracks[0]).time_axis
         self.is_long = len(self.time_axis) * len(tracks) > MAX_STACKED_KEYS
-        self._stacked = 0
+        self._num_stacked = 0
         self._whole = stacked
 
     @property
@@ -50,11 +51,11 @@ class LazyBatch:
         """Return a batch with these keys (F,) at least, and their indices in it."""
         low, high = (int(left.min()), int(right.max()) + 1) if len(left) else (0, 1)
         if not self.is_long:
-            self._stacked += high - low
+            self._num_stacked += high - low
             keys = len(self.time_axis)
-            if self._whole is not None or 2 * (high - low) >= keys or self._stacked > 2 * keys:
+            if self._whole is not None or 2 * (high - low) >= keys or self._num_stacked > 2 * keys:
                 return self.whole, left, right
-        elif high - low > 2 * len(left):
+        elif len(left) and high - low > 2 * len(left):
             used, found = np.unique(np.concatenate((left, right)), return_inverse=True)
             first, second = np.split(found, 2)
             return self._stack(used, TimeAxis(self.time_axis.times[used])), first, second
@@ -82,24 +83,55 @@ class LazyBatch:
 def mixed_batches(tracks: Iterable[Track]) -> tuple[list[LazyBatch], list[MixedBatch]]:
     """Return `tracks` grouped by rule: those of one time axis, and those of several.
 
-    Those of more than MAX_STACKED_KEYS keys are grouped by time axis too.
+    Of more than MAX_STACKED_KEYS keys, long axes are batches of their own, and several hold that many.
     """
     tracks, groups = tuple(tracks), dict[Rule, list[int]]()
     for i, track in enumerate(tracks):
         groups.setdefault(rule_of(track), []).append(i)
-    single, mixed = [], []
+    single: list[LazyBatch] = []
+    mixed: list[MixedBatch] = []
     for group in groups.values():
-        chosen = tuple(tracks[i] for i in group)
-        axes = tuple(dict.fromkeys(track.time_axis for track in chosen))
-        counts = np.array([len(track.values) for track in chosen])
-        if len(axes) == 1 or counts.sum() > MAX_STACKED_KEYS:
-            single += [LazyBatch(each.tracks, np.array(group)[each.numbers]) for each in lazy_batches(chosen)]
-            continue
-        index = {axis: i for i, axis in enumerate(axes)}
-        axis_of = np.array([index[track.time_axis] for track in chosen])
-        joined = stack_values(chosen, np.concatenate)
-        mixed.append(MixedBatch(chosen, np.array(group), axes, axis_of, np.cumsum(counts) - counts, *joined))
+        axes = [
+            LazyBatch(each.tracks, np.array(group)[each.numbers]) for each in lazy_batches(tracks[i] for i in group)
+        ]
+        if sum(map(_num_keys, axes)) > MAX_STACKED_KEYS:
+            single += [each for each in axes if _num_keys(each) > MAX_MIXED_KEYS]
+            axes = [each for each in axes if _num_keys(each) <= MAX_MIXED_KEYS]
+        for part in _parts(axes):
+            if len(part) == 1:
+                single += part
+            else:
+                mixed.append(_mix(part))
     return single, mixed
+
+
+def _num_keys(batch: LazyBatch) -> int:
+    return len(batch.time_axis) * len(batch.tracks)
+
+
+def _parts(batches: list[LazyBatch]) -> list[list[LazyBatch]]:
+    """Divide batches into lists of at most MAX_STACKED_KEYS keys."""
+    parts, count = [list[LazyBatch]()], 0
+    for each in batches:
+        count += _num_keys(each)
+        if parts[-1] and count > MAX_STACKED_KEYS:
+            parts.append([])
+            count = _num_keys(each)
+        parts[-1].append(each)
+    return parts if batches else []
+
+
+def _mix(batches: list[LazyBatch]) -> MixedBatch:
+    """Stack batches of different axes and one rule, in the order of their tracks."""
+    numbers = np.concatenate([each.numbers for each in batches])
+    order = np.argsort(numbers, kind="stable")
+    tracks = [track for each in batches for track in each.tracks]
+    chosen = tuple(tracks[i] for i in order.tolist())
+    axis_of = np.repeat(np.arange(len(batches)), [len(each.tracks) for each in batches])[order]
+    counts = np.array([len(track.values) for track in chosen])
+    axes = tuple(each.time_axis for each in batches)
+    joined = stack_values(chosen, np.concatenate)
+    return MixedBatch(chosen, numbers[order], axes, axis_of, np.cumsum(counts) - counts, *joined)
 
 
 def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:

@@ -258,8 +258,7 @@ def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
 def _names(found: Loop, *, quote: bool = False) -> str:
     """Names of the joints that stay open, the largest loop gap first."""
     names = [f"'{each.joint}'" if quote else each.joint for each in found.joints]
-    more = len(names) - MAX_LISTED_JOINTS
-    return ", ".join(names[:MAX_LISTED_JOINTS]) + (f" and {more} more" if more > 0 else "")
+    return list_some(names, MAX_LISTED_JOINTS)
 
 
 def _json(

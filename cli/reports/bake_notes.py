@@ -11,11 +11,10 @@ from anim.model import Clip, MeshInstance, Scene
 from anim.skinning.analysis.inbetween_error import InbetweenError
 from anim.skinning.analysis.method_deviation import Deviation
 from anim.skinning.bake import bakeable_instances
-from anim.units import plural
+from anim.units import FEW, list_some, plural
 from cli import text
 from cli.text import Reporter
 
-MAX_LISTED_JOINTS = 3  # joints that a note lists
 MIN_TIME_DIFFERENCE_S = 1e-3  # s; smaller differences are of rounding
 VISIBLE_ERROR_PER_DIAGONAL = 1e-3  # of the diagonal; smaller errors are invisible
 
@@ -37,10 +36,9 @@ def lost_data_notes(found: Sequence[tuple[str, Deviation]], method: str, reporte
 def uneven_scale_note(joints: Sequence[int], scene: Scene, method: str, reporter: Reporter) -> None:
     """Note the joints with non-uniform scale if other tools define the method differently there."""
     if joints:
-        names = ", ".join(f"'{scene.skeleton.names[node] or f'node {node}'}'" for node in joints[:MAX_LISTED_JOINTS])
-        more = f" and {len(joints) - MAX_LISTED_JOINTS} more" if len(joints) > MAX_LISTED_JOINTS else ""
+        names = list_some([f"'{scene.skeleton.display_name(node)}'" for node in joints], FEW)
         reporter.info(
-            f"note: {names}{more}: non-uniform scale, for which tools define {method} differently; here each joint "
+            f"note: {names}: non-uniform scale, for which tools define {method} differently; here each joint "
             "scales the mesh about its origin before rotating it"
         )
 

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from anim.units import plural
+from anim.units import list_some, plural
 from cli import text
 from cli.io import documents
 from cli.io.cache_files import SavedCache
 from cli.text import Reporter
-
-MAX_LISTED_FILES = 8  # files in a note
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +29,8 @@ class BakedFile:
 def report_written(done: Sequence[BakedFile], reporter: Reporter, *, dry_run: bool) -> None:
     """Report the files already written when a later one fails."""
     if done and not dry_run:
-        names = ", ".join(each.file for each in done[:MAX_LISTED_FILES])
-        more = f" and {len(done) - MAX_LISTED_FILES} more" if len(done) > MAX_LISTED_FILES else ""
-        reporter.info(f"note: {plural(len(done), 'file')} written before: {names}{more}")
+        names = list_some([each.file for each in done])
+        reporter.info(f"note: {plural(len(done), 'file')} written before: {names}")
 
 
 def report_notes(done: Sequence[BakedFile], reporter: Reporter) -> None:
@@ -45,8 +42,7 @@ def report_notes(done: Sequence[BakedFile], reporter: Reporter) -> None:
         for note in each.saved.written.notes:
             files.setdefault(note, []).append(PurePath(each.file).name)
     for note, names in files.items():
-        more = f" and {len(names) - MAX_LISTED_FILES} more" if len(names) > MAX_LISTED_FILES else ""
-        where = f"{', '.join(names[:MAX_LISTED_FILES])}{more}: " if len(names) < len(done) else ""
+        where = f"{list_some(names)}: " if len(names) < len(done) else ""
         reporter.info(f"note: {where}{note}")
 
 

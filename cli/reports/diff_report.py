@@ -11,7 +11,7 @@ from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.diff import END_TOLERANCE_S, ClipDiff, Diff
 from anim.measure.error.statistics import Peak
 from anim.measure.inspect.storage_cost import StorageCost
-from anim.units import format_number, plural
+from anim.units import format_number, list_some, plural
 from cli import tables
 from cli.reports import json_report
 from cli.text import format_change, format_length, format_speed
@@ -148,9 +148,8 @@ def _alone(found: DiffReport) -> list[str]:
     ):
         if names:
             noun, rest = which.split(" ", 1)
-            more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
-            listed = ", ".join(f"'{tables.escape_control(name)}'" for name in names[:MAX_LISTED_NAMES])
-            lines.append(f"{plural(len(names), noun)} {rest}: {listed}{more}")
+            listed = list_some([f"'{tables.escape_control(name)}'" for name in names], MAX_LISTED_NAMES)
+            lines.append(f"{plural(len(names), noun)} {rest}: {listed}")
     if not diff.by_vertex:
         lines.append("meshes differ: the first file's vertices, carried by the second one's joints")
     return lines

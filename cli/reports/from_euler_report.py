@@ -13,12 +13,11 @@ from anim.exchange.euler.motion import EulerMotion
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
 from anim.model import Skeleton
-from anim.units import plural
+from anim.units import list_some, plural
 from cli import tables, text
 from cli.reports import json_report
 
 SCHEMA = 1
-MAX_LISTED_NAMES = 8  # names in a line
 WORDS = {
     Measure.JOINTS: "the path is scaled by the distances of the matched joints at rest",
     Measure.EXTENT: "the path is scaled by the sizes of both figures at rest",
@@ -109,8 +108,7 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
 
 def listed(names: list[str]) -> str:
     """Return some names for a line: "'a', 'b' and 3 more"."""
-    words = ", ".join(f"'{name}'" for name in names[:MAX_LISTED_NAMES])
-    return f"{words} and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else words
+    return list_some([f"'{name}'" for name in names])
 
 
 def _angles_line(motion: EulerMotion) -> Iterator[str]:

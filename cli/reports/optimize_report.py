@@ -17,12 +17,11 @@ from anim.optimization.options import Drop, Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from anim.optimization.writing import KEY
-from anim.units import format_number, list_some, plural
+from anim.units import FEW, format_number, list_some, plural
 from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
 
-MAX_LISTED = 3  # positions in the file that a note lists
 MIN_PARALLEL_KEYS = 60_000  # keys times tracks; above, worker processes save more time than they cost
 
 
@@ -89,10 +88,7 @@ def retained_keys(document: Document, clips: Iterable[int]) -> str:
     places = extensions_naming_keys(document.json, clips)
     if not places:
         return ""
-    named = ", ".join(places[:MAX_LISTED]) + (
-        f" and {len(places) - MAX_LISTED} more" if len(places) > MAX_LISTED else ""
-    )
-    return f"some old keys stay in the file, since unknown extensions may refer to them ({named})"
+    return f"some old keys stay in the file, since unknown extensions may refer to them ({list_some(places, FEW)})"
 
 
 def worst(found: Optimized) -> float:

@@ -18,7 +18,7 @@ from anim.gltf.reading import reader
 from anim.gltf.writing import writer
 from anim.model import Scene
 from anim.operations.selection import Selection
-from anim.units import plural
+from anim.units import list_some, plural
 from cli import tables
 from cli.errors import CheckError, UsageError
 from cli.io import documents, scenes
@@ -135,7 +135,7 @@ def index_of(replaced: str | None, document: Document) -> int | None:
     names = reader.names(document)
     found = Selection((replaced,)).chosen_clips(names)
     if len(found) > 1:
-        listed = ", ".join(f"#{i} '{names[i]}'" for i in found[: from_euler_report.MAX_LISTED_NAMES])
+        listed = list_some([f"#{i} '{names[i]}'" for i in found])
         raise NotFoundError(f"--replace '{replaced}' means {len(found)} clips (expected one)", help=f"one of {listed}")
     return found[0]
 

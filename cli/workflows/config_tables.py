@@ -74,7 +74,10 @@ def _table(path: Path) -> dict[str, Any] | None:
         table = tools.get("gltf-anim") if isinstance(tools, dict) else None
     if not isinstance(table, dict):
         return None
-    _check_integers(path, "", table)
+    try:
+        _check_integers(path, "", table)
+    except RecursionError:
+        raise UsageError(f"{path}: is nested too deep") from None
     return table
 
 
@@ -87,4 +90,4 @@ def _check_integers(path: Path, where: str, value: object) -> None:
         for each in value:
             _check_integers(path, where, each)
     elif isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
-        raise UsageError(f"{path}: {where} is a whole number that TOML can't hold (expected at most {MAX_INTEGER})")
+        raise UsageError(f"{path}: {where} is a whole number that TOML can't hold (expected 64 bits)")

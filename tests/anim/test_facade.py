@@ -143,6 +143,8 @@ def test_clips_are_taken_by_name_and_index(biped: Path) -> None:
     with pytest.raises(anim.NotFoundError) as caught:
         clips["wlak"]
     assert caught.value.help == "did you mean 'walk'?"
+    with pytest.raises(anim.NotFoundError, match="'#01'"):
+        clips["#01"]
     with pytest.raises(anim.NotFoundError, match="walk, wave, jump"):
         clips[3]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anim.errors import RangeError
-from anim.units import format_number, parse_angle, parse_fraction, parse_length, plural
+from anim.units import FEW, format_number, list_some, parse_angle, parse_fraction, parse_length, plural
 from cli.text import format_instant, format_length, format_time
 
 
@@ -25,6 +25,13 @@ def test_a_number_beyond_float64_is_refused() -> None:
 def test_a_count_has_its_noun_in_the_singular_or_plural() -> None:
     assert [plural(count, "clip") for count in (0, 1, 2)] == ["0 clips", "1 clip", "2 clips"]
     assert [plural(count, "vertex", "vertices") for count in (1, 2)] == ["1 vertex", "2 vertices"]
+
+
+def test_of_many_names_some_are_listed() -> None:
+    names = list("abcdefghi")
+    assert list_some(names[:8]) == "a, b, c, d, e, f, g, h"
+    assert list_some(names) == "a, b, c, d, e, f, g, h and 1 more"
+    assert list_some(names, FEW) == "a, b, c and 6 more"
 
 
 @pytest.mark.parametrize(("value", "text"), [(1e300, "1e+300"), (-3.4e38, "-3.4e+38"), (123_456_789.0, "123000000")])

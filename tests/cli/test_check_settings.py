@@ -36,6 +36,7 @@ def test_settings_come_from_the_nearest_file_upwards(folder: Path, call: Call) -
         ('[check]\ntarget = "nobody"\n', "there is no target"),
         ('[[check.files]]\nignore = ["GA1"]\n', "has no match"),
         ("[check\n", "gltf-anim.toml: "),
+        (f"check{'.a' * 3000} = 1\n", "gltf-anim.toml: is nested too deep"),
         (f'[[budget]]\nmatch = "*"\nbytes = {"9" * 6000}\n', "number of thousands of digits (TOML has 64 bits)"),
         (f'[[budget]]\nmatch = "*"\nbytes = {"9" * 4000}\n', "budget.bytes is a whole number that TOML can't hold"),
         (f"[check]\nselect = 0x{'f' * 6000}\n", "check.select is a whole number that TOML can't hold"),

@@ -9,7 +9,7 @@ from anim.check.edits import free_name, rename_nodes
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document
-from anim.gltf.reading import reader
+from anim.units import FEW, list_some
 
 UNITY = "unity"
 
@@ -25,7 +25,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for name, nodes in by_name.items():
         if len(nodes) > 1:
             named = f"are named '{name}'" if name else "have no name"
-            problem = f"{len(nodes)} animated nodes {named} ({_listed(nodes)})"
+            problem = f"{len(nodes)} animated nodes {named} ({list_some([*map(str, nodes)], FEW)})"
             yield file.in_node(nodes[0], len(nodes), problem=problem)
 
 
@@ -33,9 +33,8 @@ def _equal_paths(file: CheckedFile) -> Iterator[Occurrence]:
     animated = set(animated_nodes(file))
     for path, nodes in _nodes_by_path(file).items():
         if len(nodes) > 1 and not animated.isdisjoint(nodes):
-            problem = (
-                f"{len(nodes)} nodes have the path '{path}' ({_listed(nodes)}), by which Unity finds animated ones"
-            )
+            listed = list_some([*map(str, nodes)], FEW)
+            problem = f"{len(nodes)} nodes have the path '{path}' ({listed}), by which Unity finds animated ones"
             yield file.in_node(nodes[0], len(nodes), problem=problem)
 
 
@@ -50,11 +49,6 @@ def _nodes_by_path(file: CheckedFile) -> dict[str, list[int]]:
             paths[node] = above + (skeleton.names[node] or f"Node-{node}")
             found.setdefault(paths[node], []).append(node)
     return {path: sorted(nodes) for path, nodes in found.items()}
-
-
-def _listed(nodes: Sequence[int]) -> str:
-    more = f" and {len(nodes) - reader.MAX_LISTED_CLIPS} more" if len(nodes) > reader.MAX_LISTED_CLIPS else ""
-    return f"{', '.join(map(str, nodes[: reader.MAX_LISTED_CLIPS]))}{more}"
 
 
 def animated_nodes(file: CheckedFile) -> list[int]:

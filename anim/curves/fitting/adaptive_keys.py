@@ -120,11 +120,11 @@ def float32_tolerance(track: Track, tolerance: float) -> float:
     return max(tolerance, 4 * float(np.spacing(np.float32(np.abs(track.values).max(initial=0.0)))))
 
 
-def refine(times: Floats, count: SegmentCount, limit: int | None = None) -> Floats:
+def refine(times: Floats, count: SegmentCount, limit: int | None = None, *, block: int = BLOCK) -> Floats:
     """Return times (T,) and added float32-exact ones, until no segment needs to be split.
 
     count: takes segments from a to b (B,), returns for each the number of segments (B,), up to MAX_SUBDIVISIONS, to
-    split it into; 1 for none.
+    split it into; 1 for none. block: number of segments that it is asked about at a time.
     Raises UnsupportedError for over `limit` keys, MAX_KEYS by default, before they are computed.
     """
     limit = MAX_KEYS if limit is None else limit
@@ -135,18 +135,15 @@ def refine(times: Floats, count: SegmentCount, limit: int | None = None) -> Floa
         a, b = a[splittable], b[splittable]
         if not len(a):
             break
-        counts = _count_in_blocks(count, a, b)
+        counts = np.concatenate([count(a[i : i + block], b[i : i + block]) for i in range(0, len(a), block)])
         again = counts > 1
         if counts[again].sum() + sum(map(len, found)) > limit:
-            raise UnsupportedError(f"the motion needs over {limit} keys")
+            raise UnsupportedError(
+                f"the motion needs over {limit} keys", help="a shorter clip, or a larger tolerance, needs fewer"
+            )
         a, b = split_segments(a[again], b[again], counts[again])
         found.append(a)
     return unique_sorted(np.concatenate(found))
-
-
-def _count_in_blocks(count: SegmentCount, a: Floats, b: Floats) -> Ints:
-    counts = [count(a[i : i + BLOCK], b[i : i + BLOCK]) for i in range(0, len(a), BLOCK)]
-    return np.concatenate(counts)
 
 
 def split_segments(a: Floats, b: Floats, counts: Ints) -> tuple[Floats, Floats]:

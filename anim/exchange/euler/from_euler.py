@@ -59,8 +59,8 @@ def from_euler(
     tolerance: rad; the maximum error of translations is tolerance × the skeleton's size, of scales tolerance × 1.
     keys: ADAPTIVE as above; GRID adds no key and ignores jumps of angles by multiples of 360°; AUTO is GRID for
     recordings: BVH, or linear curves on one even grid of 10 keys a second or more.
-    Raises RangeError for a tolerance below 1e-6 or above pi, UnsupportedError for over 100 times the source's keys, if
-    these are over 100 000.
+    Raises RangeError for a tolerance below 1e-6 or above pi, UnsupportedError for more keys than 100 000 and
+    than 100 times those of the source.
     XYZ (0, 0, 0) at 0 s → (90°, 90°, 0) at 1 s, tolerance 0.1° → a rotation track of 15 keys
     """
     if not MIN_TOLERANCE <= tolerance <= np.pi:
@@ -117,18 +117,25 @@ class _TrackBuilder:
                         for other in self.equal[number]:
                             self._add(other, self._nodes[other], path, keys)
             except AnimError as error:
-                advice = FEWER_KEYS if isinstance(error, UnsupportedError) else ""
-                raise error.at(f"node '{node.name}'").advise(advice) from None
+                raise error.at(f"node '{node.name}'") from None
 
     def _alone(self, node: EulerNode, path: str, tolerance: float | None) -> NodeKeys:
         unit = self._units[path]
         allowed = None if tolerance is None else tolerance * unit
-        return fit_node(self._stored.node(node), path, allowed, self._left)
+        try:
+            return fit_node(self._stored.node(node), path, allowed, self._left)
+        except UnsupportedError as error:
+            if self._left < self._limit:  # what nodes before this one have left, which is no limit to be named
+                raise self._too_many_keys() from None
+            raise UnsupportedError(str(error), help=FEWER_KEYS) from None
 
     def _count(self, num_keys: int) -> None:
         self._left -= num_keys
         if self._left < 0:
-            raise UnsupportedError(f"the motion needs over {self._limit} keys")
+            raise self._too_many_keys()
+
+    def _too_many_keys(self) -> UnsupportedError:
+        return UnsupportedError(f"the motion up to here needs over {self._limit} keys", help=FEWER_KEYS)
 
     def _add(self, number: int, node: EulerNode, path: str, keys: NodeKeys) -> None:
         """Add a track unless it is equal to the rest pose: many recorders write six channels for every joint."""

@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from anim.model import Skeleton, Track
-
-MAX_LISTED_NAMES = 3  # names in a note
+from anim.units import FEW, list_some
 
 
 def unique(names: Sequence[str]) -> list[str]:
@@ -39,5 +38,4 @@ def label_of(track: Track, names: Sequence[str]) -> str:
 
 def skipped_note(what: Sequence[str]) -> tuple[str, ...]:
     """Return one note: "left out: weights of 'head', scale of 'arm' and 3 more"; none if empty."""
-    more = f" and {len(what) - MAX_LISTED_NAMES} more" if len(what) > MAX_LISTED_NAMES else ""
-    return (f"left out: {', '.join(what[:MAX_LISTED_NAMES])}{more}",) if what else ()
+    return (f"left out: {list_some(what, FEW)}",) if what else ()

@@ -11,7 +11,6 @@ import numpy as np
 
 from anim.arrays import Floats, Ints, unique_sorted
 from anim.curves.fitting.adaptive_keys import (
-    SegmentCount,
     refine,
     rotation_segment_count,
     sample_times,
@@ -126,7 +125,7 @@ def retarget(
         count = partial(_segment_count, at, units=units, size=size, tolerance=source.tolerance)
         num_nodes = len(source.skeleton) + len(target.skeleton)
         block = max(BLOCK_MATRICES // (NUM_SAMPLES * num_nodes), 1)
-        times = refine(times, partial(_count_in_blocks, count, block))
+        times = refine(times, count, block=block)
     inside = at(inside_interval(knots)) if len(before) else None
     wanted = _RequiredKeys(times, at(times), before, knots, inside, thin=source.tolerance is not None)
     clip = Clip(source.clip.name, tuple(_tracks(follow, wanted, size)))
@@ -161,11 +160,6 @@ def _metres_per_unit(follow: PoseTransfer) -> dict[int, float]:
     world = rest_world(skeleton)
     lengths = {-1: 1.0} | {n: float(np.cbrt(abs(np.linalg.det(world[n, :, :3])))) for n in range(len(skeleton))}
     return {node: lengths[int(skeleton.parents[node])] for node in follow.pairs.values()}
-
-
-def _count_in_blocks(count: SegmentCount, block: int, a: Floats, b: Floats) -> Ints:
-    """The numbers (B,) that `count` gives, `block` segments at a time: memory is that of the poses of one block."""
-    return np.concatenate([count(a[i : i + block], b[i : i + block]) for i in range(0, len(a), block)])
 
 
 def _segment_count(

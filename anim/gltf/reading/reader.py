@@ -15,8 +15,7 @@ from anim.gltf.reading.meshes import BYTES_PER_POSED_VERTEX, Meshes
 from anim.gltf.reading.scene_nodes import check_not_required, depth_first
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, MorphedNode, Scene, Skeleton, Skin
-
-MAX_LISTED_CLIPS = 3  # clips in a message
+from anim.units import FEW, list_some
 
 
 def skeleton(document: Document) -> Skeleton:
@@ -146,9 +145,8 @@ def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
     """Return a label for several clips, by names and indices: "clips 'walk', #3, 'run' and 4 more"."""
     if len(clips) == 1:
         return clip_label(*clips[0])
-    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips[:MAX_LISTED_CLIPS]]
-    more = f" and {len(clips) - MAX_LISTED_CLIPS} more" if len(clips) > MAX_LISTED_CLIPS else ""
-    return f"clips {', '.join(names)}{more}"
+    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips]
+    return f"clips {list_some(names, FEW)}"
 
 
 def choose_option(numbers: Collection[int]) -> str:
@@ -156,7 +154,7 @@ def choose_option(numbers: Collection[int]) -> str:
 
     choose_option([0, 2]) → " --clip '#0' --clip '#2'"
     """
-    return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= MAX_LISTED_CLIPS else ""
+    return "".join(f" --clip '#{number}'" for number in numbers) if len(numbers) <= FEW else ""
 
 
 def clip_name(name: str, number: int) -> str:

@@ -21,9 +21,9 @@ from anim.measure.error.sample_times import FPS, dense_times
 from anim.measure.error.statistics import Peak, Statistics, statistics
 from anim.model import Clip, Scene, Track
 from anim.sampling.players import parse_pair
+from anim.units import FEW, list_some
 
 END_TOLERANCE_S = 1e-6  # smaller differences of clip ends come from rounding
-MAX_LISTED = 3  # names in a sentence
 
 
 class ClipDiff(NamedTuple):
@@ -151,8 +151,8 @@ def _listed(names: Sequence[str]) -> str:
     """Names of meshes and the verb: "mesh 'body' has", "meshes 'body', 'hair' and 3 more have"."""
     if len(names) == 1:
         return f"mesh '{names[0]}' has"
-    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-    return "meshes " + ", ".join(f"'{name}'" for name in names[:MAX_LISTED]) + f"{more} have"
+    quoted = [f"'{name}'" for name in names]
+    return f"meshes {list_some(quoted, FEW)} have"
 
 
 def _compare_pairs(

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import MAX_SINGLE_M, Floats, Ints
 from anim.measure.error.displacement import CHUNK, DisplacementField, SkinnedDisplacement, vector_lengths
 
-MAX_SINGLE = 1e15  # m, of terms in float32: their squares, and sums of squares, are finite
 MAX_TERM_RATIO = 20.0  # of the largest term of a vector to the longest vector; beyond it float32 loses digits
 FIRST = 8  # frames evaluated before the bounds of the others are updated
 
@@ -42,7 +41,7 @@ def lengths_by_group(field: DisplacementField, groups: int, frames: Ints) -> lis
     """
     if isinstance(field, SkinnedDisplacement):
         single, largest = field.in_single_precision()
-        if largest < MAX_SINGLE:
+        if largest < MAX_SINGLE_M:
             found = _flat_lengths(single, groups, frames)
             longest = max((float(each.max(initial=0.0)) for each in found), default=0.0)
             if largest <= MAX_TERM_RATIO * longest:

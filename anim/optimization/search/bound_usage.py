@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import AnyArray, Bools, Floats, Ints
+from anim.arrays import MAX_SINGLE_M, AnyArray, Bools, Floats, Ints
 from anim.maths import matrix, quaternion
 from anim.model import Skeleton
 from anim.optimization.options import Bounds
@@ -22,7 +22,6 @@ MAX_BLOCK_MATRICES = 100_000  # world matrices of nodes at a time: 10 MB; more a
 MIN_BLOCK_TIMES = 64
 # A clip is measured in float32, in half the time, where its bounds are this many rounding errors of its positions.
 MIN_ROUNDINGS = 4000
-MAX_SINGLE_M = 1e15  # squares of larger coordinates could overflow in float32
 PROBE_TIMES = 8  # of a clip, at which the nodes between the roots and the points are looked at
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Bools, Floats
+from anim.arrays import MAX_SINGLE_M, Bools, Floats
 from anim.maths import hierarchy
 from anim.measure.error import point_matrix as points_
 from anim.measure.error.point_matrix import PointMatrix
@@ -20,8 +20,6 @@ from anim.optimization.tracks import morph_weights
 from anim.optimization.tracks.quantization import Encoding
 from anim.sampling.pose import rest_world
 from anim.sampling.weight_pointers import moved_nodes
-
-MAX_COORDINATE_M = 1e15
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +46,9 @@ class Context:
     @property
     def is_measurable(self) -> bool:
         """True where bounds are finite, and all coordinates small enough for their squares in float32."""
-        most = max(np.abs(part).max(initial=0.0) for part in (self.rest_world, self.points.factors))
-        return bool(most < MAX_COORDINATE_M) and bool(np.isfinite((self.size, self.bounds.max_error)).all())
+        largest = [np.abs(part).max(initial=0.0) for part in (self.rest_world, self.points.factors)]
+        is_finite = bool(np.isfinite((self.size, self.bounds.max_error)).all())
+        return is_finite and all(each < MAX_SINGLE_M for each in largest)
 
     def morph_reach(self, node: int) -> Floats:
         """Return the displacement (M, V), m, of each vertex by each morph target of a node at weight 1."""

@@ -16,11 +16,10 @@ from anim.gltf.io.images import media_type
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import BASISU, WEBP, image_data
 from anim.show.page.packing import Packing
-from anim.units import plural
+from anim.units import FEW, list_some, plural
 
 DRAWN = ("image/png", "image/jpeg", "image/webp", "image/avif")
 PREFERRED = (WEBP, "EXT_texture_avif")  # instead of a texture's own source
-MAX_LISTED_IMAGES = 3  # images in a note
 WHITE_PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
 )
@@ -116,5 +115,4 @@ def _is_usable(index: Any, usable: Collection[int]) -> bool:
 def _notes(faults: list[str], lost: int) -> list[str]:
     if not faults:
         return [f"{plural(lost, 'texture')} without an image: drawn without"] if lost else []
-    more = f" and {len(faults) - MAX_LISTED_IMAGES} more" if len(faults) > MAX_LISTED_IMAGES else ""
-    return [f"{plural(len(faults), 'image')} not drawn: {', '.join(faults[:MAX_LISTED_IMAGES])}{more}"]
+    return [f"{plural(len(faults), 'image')} not drawn: {list_some(faults, FEW)}"]

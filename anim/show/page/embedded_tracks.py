@@ -13,9 +13,7 @@ from anim.gltf.writing import writer
 from anim.model import Clip
 from anim.sampling.weight_pointers import resolve_weight_pointers
 from anim.show.page.embedded_nodes import shown_nodes
-from anim.units import plural
-
-MAX_LISTED_POINTERS = 3  # pointers in a note
+from anim.units import FEW, list_some, plural
 
 
 def resolve_pointers(document: Document) -> Document:
@@ -65,8 +63,7 @@ def _is_storable(clip: Clip) -> bool:
 def _notes(pointers: Sequence[str], outside: int) -> list[str]:
     notes = []
     if pointers:
-        more = f" and {len(pointers) - MAX_LISTED_POINTERS} more" if len(pointers) > MAX_LISTED_POINTERS else ""
-        notes.append(f"{plural(len(pointers), 'track')} not shown: {', '.join(pointers[:MAX_LISTED_POINTERS])}{more}")
+        notes.append(f"{plural(len(pointers), 'track')} not shown: {list_some(pointers, FEW)}")
     if outside:
         notes.append(f"{plural(outside, 'track')} not shown: of nodes outside the default scene")
     return notes

@@ -166,3 +166,11 @@ def test_series_are_aligned_alone() -> None:
     alone = np.concatenate([quat.align_signs(keys[series == number]) for number in np.unique(series)])
     np.testing.assert_array_equal(quat.align_signs(keys, series), alone)
     assert quat.align_signs(np.zeros((0, 4)), np.zeros(0, np.int64)).shape == (0, 4)
+
+
+@pytest.mark.parametrize("width", [3, 4])
+def test_products_of_many_components_are_those_of_few(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = np.random.default_rng(2).normal(size=(2, 50, 7, width))
+    few = quat.dot(a, b)
+    monkeypatch.setattr(quat, "LARGE", 1)
+    assert np.array_equal(quat.dot(a, b), few)

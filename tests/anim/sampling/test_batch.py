@@ -9,8 +9,9 @@ import pytest
 
 from anim.model import TimeAxis
 from anim.sampling import batch as module
-from anim.sampling.batch import concatenate
-from anim.sampling.lazy_batch import batches
+from anim.sampling import lazy_batch, sample_pose
+from anim.sampling.batch import MixedBatch, concatenate
+from anim.sampling.lazy_batch import LazyBatch, batches
 from anim.sampling.players import PLAYERS, sampler
 from anim.sampling.track import find_interval, sample
 from tests import clips
@@ -102,3 +103,40 @@ def test_tracks_lie_one_after_the_other_with_their_tangents() -> None:
 
 def test_no_tracks_are_no_groups() -> None:
     assert concatenate([]) == []
+
+
+@pytest.mark.parametrize("most", [1, 9, 40, 10**6])
+def test_tracks_of_many_axes_are_grouped_by_size(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long axes by themselves, short ones together: every track once, with the same values."""
+    monkeypatch.setattr(lazy_batch, "MAX_STACKED_KEYS", most)
+    monkeypatch.setattr(lazy_batch, "MAX_MIXED_KEYS", most // 4)
+    moving = [
+        clips.track("translation", np.arange(2 + n % 5) * (1.0 + n % 3), np.arange(3.0 * (2 + n % 5)).reshape(-1, 3))
+        for n in range(20)
+    ]
+    single, mixed = lazy_batch.mixed_batches(moving)
+    groups: list[LazyBatch | MixedBatch] = [*single, *mixed]
+    numbers = np.concatenate([each.numbers for each in groups])
+    assert sorted(numbers.tolist()) == list(range(20))
+    assert all(sum(len(track.times) for track in each.tracks) <= most for each in mixed)
+    assert bool(mixed) == (most > 1)
+    for each in groups:
+        assert all(track is moving[number] for track, number in zip(each.tracks, each.numbers.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("most", [1, 40, 10**6])
+def test_poses_do_not_depend_on_the_groups(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    moving = [
+        clips.track(
+            "translation",
+            np.arange(2 + n % 5) * (1.0 + n % 3),
+            np.random.default_rng(n).normal(size=(2 + n % 5, 3)),
+            node=n,
+        )
+        for n in range(20)
+    ]
+    nodes, at = clips.skeleton([-1] * 20), np.linspace(-1, 9, 31)
+    expected = sample_pose(nodes, clips.clip(*moving), at).translation
+    monkeypatch.setattr(lazy_batch, "MAX_STACKED_KEYS", most)
+    monkeypatch.setattr(lazy_batch, "MAX_MIXED_KEYS", most // 4)
+    assert np.array_equal(sample_pose(nodes, clips.clip(*moving), at).translation, expected)

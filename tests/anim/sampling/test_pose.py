@@ -194,6 +194,7 @@ def test_of_long_tracks_only_requested_keys_are_stacked(monkeypatch: pytest.Monk
             assert len(batch.times) == keys
             assert batch.sample(at, place)[:, 1, 2].tolist() == at.tolist()
             assert batch.is_inside(at).all()
+    assert PoseSampler(skeleton([-1, -1]), clip(*stack.tracks)).at(np.zeros(0)).translation.shape == (0, 2, 3)
 
 
 def test_a_node_that_the_skeleton_lacks_is_refused() -> None:

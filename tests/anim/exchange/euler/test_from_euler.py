@@ -9,6 +9,7 @@ import pytest
 
 from anim.arrays import Floats
 from anim.errors import RangeError, UnsupportedError
+from anim.exchange.euler import from_euler as conversion
 from anim.exchange.euler.baked_keys import KeyPlacement
 from anim.exchange.euler.curve import Curve, Mode, constant, evaluate, linear, uniform_modes
 from anim.exchange.euler.evaluate import evaluate_rotation, evaluate_translation
@@ -233,3 +234,14 @@ def _turned(q: Floats) -> Floats:
     matrix: Floats = np.eye(4)
     matrix[:3, :3] = quaternion.to_matrix(q)
     return matrix
+
+
+def test_the_limit_of_keys_is_that_of_all_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What nodes before it had left was named as the limit, down to 0."""
+    monkeypatch.setattr(conversion, "MIN_KEY_LIMIT", 40)
+    monkeypatch.setattr(conversion, "KEYS_PER_SOURCE_KEY", 1)
+    monkeypatch.setattr(conversion, "divide_nodes", lambda nodes: [range(i, i + 1) for i in range(len(nodes))])
+    nodes = tuple(_node(_straight((0, end), (0, 90), (0, 0))) for end in (90.0, 91.0, 92.0))
+    with pytest.raises(UnsupportedError, match="node 'a': the motion up to here needs over 40 keys") as error:
+        from_euler(EulerMotion(nodes), tolerance=TOLERANCE)
+    assert error.value.help.endswith("adds none")

@@ -9,6 +9,7 @@ from anim.model import Clip, Interpolation, Track
 from anim.model.track import share_time_axes
 from anim.optimization.options import Objective, Packing
 from anim.optimization.search.plan import Solution, value_bytes
+from anim.optimization.tracks import lossless_size
 from anim.optimization.tracks.key_reduction import reduce_lossless
 from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, EncodedKeys, Encoding
@@ -43,6 +44,13 @@ def test_no_lossless_clip_is_smaller(seed: int, stays: bool) -> None:
         slim = [track for track in slim if len(track.times) > 1]
     exact = Solution(Clip("", tuple(slim)), tuple(EncodedKeys(track.values, "as it is") for track in slim), ())
     assert min_lossless_bytes(tracks, [stays] * len(tracks), COSTS) <= exact.size(Encoding(Packing.CORE, COSTS))
+
+
+def test_tracks_of_one_axis_are_counted_alike_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks = [*_tracks(1), *_tracks(2)]
+    whole = min_lossless_bytes(tracks, [True] * len(tracks), COSTS)
+    monkeypatch.setattr(lossless_size, "MAX_STACKED_VALUES", 1)
+    assert min_lossless_bytes(tracks, [True] * len(tracks), COSTS) == whole
 
 
 def test_floats_that_all_differ_are_counted_whole() -> None:
