@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import CubicSegment, Easing, format_call
+from anim.curves.easing.function import MAX_PARAMETER, CubicSegment, Easing, format_call
 from anim.errors import RangeError
 from anim.maths import bezier
 
@@ -20,14 +20,14 @@ HANDLE_TOLERANCE = 1e-12  # distance of handles from 1/3 and 2/3 below which the
 def cubic_bezier(x1: float, y1: float, x2: float, y2: float, *, name: str = "") -> Easing:
     """Return the easing along the Bézier (0, 0), (x1, y1), (x2, y2), (1, 1): progress y over time x.
 
-    x1 and x2 are in 0 … 1, y1 and y2 are any finite numbers; RangeError otherwise. Handles at thirds of the time give
-    an exact cubic, handles on the diagonal a line. The slope is ±inf at a vertical handle.
+    x1 and x2 are in 0 … 1, y1 and y2 at most MAX_PARAMETER away from 0; RangeError otherwise. Handles at thirds of the
+    time give an exact cubic, handles on the diagonal a line. The slope is ±inf at a vertical handle.
     cubic_bezier(0.25, 0.1, 0.25, 1) → CSS `ease`
     """
     if not (0 <= x1 <= 1 and 0 <= x2 <= 1):
         raise RangeError(f"x1 and x2 are {x1:g} and {x2:g} (expected 0 … 1, time can't run backwards)")
-    if not np.isfinite((y1, y2)).all():
-        raise RangeError(f"y1 and y2 are {y1:g} and {y2:g} (expected finite numbers)")
+    if not np.abs((y1, y2)).max() <= MAX_PARAMETER:
+        raise RangeError(f"y1 and y2 are {y1:g} and {y2:g} (expected -{MAX_PARAMETER} … {MAX_PARAMETER})")
 
     def value(u: Floats) -> Floats:
         return bezier.evaluate(bezier.parameter(u, x1, x2), y1, y2)

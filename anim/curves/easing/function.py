@@ -13,6 +13,7 @@ from anim.maths import hermite
 
 Function: TypeAlias = Callable[[Floats], Floats]
 
+MAX_PARAMETER = 100  # of handles, slopes and overshoots: a curve with more takes more keys than anybody stores
 EXTENT_SAMPLES = 4097  # finds an extremum of curvature c with an error below c · 8e-9
 OVERSHOOT_TOLERANCE = 1e-9  # smaller overshoots are rounding
 

@@ -10,7 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import CubicSegment, Easing, ease_in_out_from, ease_out_from, format_call
+from anim.curves.easing.function import (
+    MAX_PARAMETER,
+    CubicSegment,
+    Easing,
+    ease_in_out_from,
+    ease_out_from,
+    format_call,
+)
 from anim.errors import RangeError
 
 OVERSHOOT = 1.70158  # back: overshoots the range by 10 %
@@ -36,11 +43,11 @@ def penner() -> list[Easing]:
 def back_in(overshoot: float, *, name: str = "") -> Easing:
     """Return the easing with an undershoot: (s+1)u³ − su² for s = `overshoot` ≥ 0; 10 % for 1.70158.
 
-    Raises RangeError for an overshoot that is negative or not finite.
+    Raises RangeError for an overshoot that is negative or over MAX_PARAMETER.
     """
     s = float(overshoot)
-    if not (np.isfinite(s) and s >= 0):
-        raise RangeError(f"overshoot is {s:g} (expected 0 or more; 1.70158 is 10 % of the way)")
+    if not 0 <= s <= MAX_PARAMETER:
+        raise RangeError(f"overshoot is {s:g} (expected 0 … {MAX_PARAMETER}; 1.70158 is 10 % of the way)")
     return Easing(
         name or format_call("back-in", s),
         lambda u: u * u * (1 + (s + 1) * (u - 1)),

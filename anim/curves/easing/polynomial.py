@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.curves.easing.function import CubicSegment, Easing, format_call
+from anim.curves.easing.function import MAX_PARAMETER, CubicSegment, Easing, format_call
 from anim.errors import RangeError
 from anim.maths import hermite as cubic
 
@@ -15,11 +15,11 @@ ZERO, ONE = np.zeros(()), np.ones(())
 def hermite(slope0: float, slope1: float, *, name: str = "") -> Easing:
     """Return the cubic easing with slopes `slope0` and `slope1` at its ends, relative to constant speed.
 
-    Any finite slopes: negative ones undershoot, large ones overshoot. Raises RangeError for others.
+    Slopes of at most MAX_PARAMETER: negative ones undershoot, large ones overshoot. Raises RangeError for others.
     hermite(0, 0) → smoothstep, hermite(1, 1) → linear, hermite(0, 3) → cubic-in
     """
-    if not np.isfinite((slope0, slope1)).all():
-        raise RangeError(f"slopes are {slope0:g} and {slope1:g} (expected finite numbers)")
+    if not np.abs((slope0, slope1)).max() <= MAX_PARAMETER:
+        raise RangeError(f"slopes are {slope0:g} and {slope1:g} (expected -{MAX_PARAMETER} … {MAX_PARAMETER})")
     m0, m1 = np.asarray(slope0, dtype=np.float64), np.asarray(slope1, dtype=np.float64)
     return Easing(
         name or format_call("hermite", slope0, slope1),

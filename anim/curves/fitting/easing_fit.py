@@ -33,7 +33,7 @@ def fit_cubic(f: Function, df: Function, breakpoints: tuple[float, ...], toleran
     fit_cubic(smootherstep, 30u²(1−u)², (), 1e-3) → 4 segments
     The error of a cubic Hermite segment of length h is about h⁴/384 · max|f⁗|; it is measured here.
     """
-    path = FitTarget(lambda u: f(u)[..., None], lambda u: np.ones((*u.shape, 1)), df, _difference, breakpoints)
+    path = FitTarget(lambda u: f(u)[..., None], np.ones_like, df, _difference, breakpoints)
     ends = np.array(subdivide(lambda a, b: fit_errors(path, a, b), (0.0, *breakpoints, 1.0), tolerance))
     a, b = ends[:-1], ends[1:]
     rate0, rate1 = fit_end_slopes(path, a, b)

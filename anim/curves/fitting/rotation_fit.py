@@ -77,9 +77,8 @@ def _circle(easing: Easing, angle: float) -> FitTarget:
         half = easing.value(u) * angle / 2
         return np.stack((np.cos(half), np.sin(half)), axis=-1)
 
-    def direction(u: Floats) -> Floats:
-        half = easing.value(u) * angle / 2
-        return np.stack((-np.sin(half), np.cos(half)), axis=-1) * (angle / 2)
+    def direction(at: Floats) -> Floats:
+        return np.stack((-at[..., 1], at[..., 0]), axis=-1) * (angle / 2)
 
     return FitTarget(point, direction, easing.derivative, _angle, easing.breakpoints)
 

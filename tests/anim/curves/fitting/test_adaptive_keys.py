@@ -72,13 +72,12 @@ def test_too_many_keys_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         refine(ENDS, lambda a, b: np.full(len(a), 8))
 
 
-def test_memory_is_that_of_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(adaptive_keys, "BLOCK", 10)
+def test_memory_is_that_of_a_block() -> None:
     sizes = []
 
     def count(a: Floats, b: Floats) -> Ints:
         sizes.append(len(a))
         return np.where(b - a > 1 / 64, 2, 1)
 
-    assert refine(ENDS, count).tolist() == np.linspace(0, 2, 129).tolist()
+    assert refine(ENDS, count, block=10).tolist() == np.linspace(0, 2, 129).tolist()
     assert max(sizes) == 10
