@@ -15,6 +15,7 @@ from anim.operations.selection import track_indices
 from anim.sampling.times import jump_time_after, separate_float32
 
 NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
+MIN_DURATION_S = 1e-6  # below, keys of a second fall together in float32
 MAX_END_S = 2.0**24  # s, 194 days; after it, float32 times do not differ by 1 s
 
 
@@ -132,8 +133,8 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if duration is None:
         return 1.0
     check_number(duration, "duration")
-    if not (math.isfinite(duration) and duration > 0):
-        raise RangeError(f"`duration` is {duration:g} s (expected a number above 0)")
+    if not (math.isfinite(duration) and duration >= MIN_DURATION_S):
+        raise RangeError(f"`duration` is {duration:g} s (expected {MIN_DURATION_S:g} or more)")
     own = clip.end - clip.start
     if own == 0:
         raise RangeError("the clip has no duration, so it can't be stretched to one")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -76,9 +77,8 @@ def edit_files(
     codes = []
     for pair in pairs:
         try:
-            if not dry_run:
-                _make_folder(pair.output)
-            edit(pair.input, pair.output)
+            with _made_folder(pair.output, needed=not dry_run):
+                edit(pair.input, pair.output)
         except UsageError:  # of the options, for all files
             raise
         except AnimError as error:
@@ -129,9 +129,20 @@ def _is_output(found: input_files.FoundFile, pattern: str) -> bool:
     return found.is_searched and inside and Path(os.path.abspath(found.path)).is_relative_to(folder)
 
 
-def _make_folder(path: str) -> None:
+@contextmanager
+def _made_folder(path: str, *, needed: bool) -> Iterator[None]:
+    """Make the folder of a file if it is `needed`; remove what was made, while empty, if the file isn't written."""
     folder = Path(path).parent
+    missing = [each for each in (folder, *folder.parents) if needed and not each.exists()]
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if needed:
+            folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise not_written(str(folder), error) from None
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # another file is there, or somebody else's
+            for each in missing:
+                each.rmdir()
+        raise

@@ -61,6 +61,7 @@ def test_find_proposes_ranges(call: Call, fixture: Fixture) -> None:
     [
         ("walk", (), "clip 'walk': no time range loops better than the whole clip"),
         ("walk", ("--shortest", "50"), "clip 'walk': no time range is as long as --shortest"),
+        ("walk", ("--shortest", "1e300"), "clip 'walk': no time range is as long as --shortest"),
         ("fall", (), "clip 'fall': no time range loops"),
         ("pose", (), "clip 'pose': a single pose, without a range to find"),
         ("nods", (), ""),

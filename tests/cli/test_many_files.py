@@ -50,6 +50,12 @@ def test_a_failing_file_is_named_and_the_rest_finishes(
     assert (crowd / "out" / "arm 1.glb").read_bytes() == single
 
 
+def test_folders_for_files_that_fail_do_not_stay(crowd: Path, call: Call) -> None:
+    assert call("retime", "in", "--speed", "2", "-o", "made/{stem}/a.glb").code == 3
+    assert outputs(crowd / "made") == {"arm 1/a.glb", "tube/a.glb"}
+    assert not (crowd / "made" / "a broken").exists()
+
+
 def test_loops_of_a_folder_are_closed_by_a_recipe(crowd: Path, call: Call) -> None:
     run = call("loop", "in", "out.glb")
     assert "in: is a folder (expected a file)" in refusal(run, 2)

@@ -113,7 +113,7 @@ def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float
     features = np.concatenate((points, speeds), axis=0).transpose(1, 0, 2).reshape(len(times), -1)
     squares = (features * features).sum(axis=1)
     apart = squares[:, None] + squares[None] - 2 * features @ features.T
-    frames = max(int(np.ceil((shortest or duration / 2) * fps - 1e-6)), 1)
+    frames = max(int(min(np.ceil((shortest or duration / 2) * fps - 1e-6), MAX_FRAMES)), 1)
     apart[np.tril_indices(len(times), frames - 1)] = np.inf
     taken: list[tuple[int, int]] = []
     for flat in np.argsort(apart, axis=None)[: 400 * count].tolist():
