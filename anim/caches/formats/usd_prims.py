@@ -16,7 +16,7 @@ ARCS = ("references", "payload", "inheritPaths", "specializes")
 
 
 def check_size(layer: Any, limit_bytes: int) -> None:
-    """Raise UnsupportedError if composing the stage of one layer takes more memory than the limit, beyond its own prims.
+    """Raise UnsupportedError if prims that one layer composes beyond its own ones take more memory than the limit.
 
     A prim that refers to another of the same file has copies of all prims below it: 20 lines with two references each
     make a million. Variants are not counted: for them the limit of allocations holds.

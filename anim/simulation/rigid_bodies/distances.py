@@ -17,7 +17,7 @@ MAX_DISTANCE_M = 1e7  # steps of float32 are a metre there
 
 def check_start(scene: RigidScene, skeleton: Skeleton) -> None:
     """Raise UnsupportedError where a body begins too far from the middle of the moving ones."""
-    positions = np.array([center_in_scene(body) for body in scene.bodies])
+    positions = np.array([center_in_scene(body, scene.extents) for body in scene.bodies])
     _check(positions[None], scene.bodies, scene_center(scene), skeleton)
 
 

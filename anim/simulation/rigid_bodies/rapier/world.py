@@ -60,7 +60,8 @@ class RapierWorld:
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
         owners = {index: body for index, (body, _) in self._colliders.items()}
-        self._slip = SlipReader(world, self._bodies, [body_extent(body).radius for body in scene.bodies], owners)
+        radii = [body_extent(body, scene.extents).radius for body in scene.bodies]
+        self._slip = SlipReader(world, self._bodies, radii, owners)
         self._weighed: list[tuple[Any, float]] = []
         self._read = [self._bodies[i] for i in scene.moving]
         anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))
