@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from anim.errors import UnsupportedError
 
 # Measured with usd-core 25, where 1 GB of these bytes is composed in 5 to 15 s, of which 0.1 to 0.6 GB are in memory.
 PRIM_BYTES = 1000  # 0.5 kB and 9 µs
-SITE_BYTES = 100  # of each spec of a prim beyond the first
+FURTHER_SPEC_BYTES = 100  # of each spec of a prim after the first
 ARC_BYTES = 4000  # 0.8 kB and 25 µs, for a graph of the prim's own
 NESTED_ARC_BYTES = 500  # of each arc and one of a prim above it, which is in the graph too: 50 B and 1 to 8 µs
 ARCS = ("references", "payload", "inheritPaths", "specializes")
 
 
-def check_size(layer: Any, limit_bytes: int) -> None:
+def has_arcs(spec: Any) -> bool:
+    """Return whether a spec refers to others."""
+    return any(map(spec.HasInfo, ARCS))
+
+
+def check_size(layer: Any, paths: Sequence[Any], limit_bytes: int) -> None:
     """Raise UnsupportedError if prims that one layer composes beyond its own ones take more memory than the limit.
 
     A prim that refers to another of the same file has copies of all prims below it: 20 lines with two references each
-    make a million. Variants are not counted: for them the limit of allocations holds.
+    make a million. paths: of the specs with arcs. Variants are not counted: for them the limit of allocations holds.
     """
-    num_prims, num_bytes = _Counter(layer, limit_bytes).count()
+    num_prims, num_bytes = _Counter(layer, limit_bytes).count(_topmost(paths))
     if num_bytes > limit_bytes:
         raise UnsupportedError(
             f"composes {num_prims} prims or more by its references to itself, which would take "
@@ -47,7 +52,7 @@ class _Prim(NamedTuple):
 
     @property
     def num_bytes(self) -> int:
-        return PRIM_BYTES + SITE_BYTES * (len(self.paths) - 1) + ARC_BYTES * self.num_arcs
+        return PRIM_BYTES + FURTHER_SPEC_BYTES * (len(self.paths) - 1) + ARC_BYTES * self.num_arcs
 
     def compose(self, below: list[_Composed]) -> _Composed:
         """Return the sums of this prim and of those below it."""
@@ -65,26 +70,31 @@ class _Counter:
 
     def __init__(self, layer: Any, limit_bytes: int) -> None:
         self._layer, self._limit_bytes = layer, limit_bytes
-        self._specs: set[Any] = set()  # paths of the layer's own prims
         self._prims: dict[tuple[Any, ...], _Prim] = {}  # many references to one prim ask for the same below it
         self._below: dict[frozenset[Any], list[frozenset[Any]]] = {}
         self._totals: dict[frozenset[Any], _Composed] = {}
         self._num_bytes = 0  # of all sets, each once
 
-    def count(self) -> tuple[int, int]:
-        """Return the number of prims of the stage, and their bytes without those of the layer's own prims.
+    def count(self, paths: Sequence[Any]) -> tuple[int, int]:
+        """Return the number of prims at the paths and below, and their bytes without those of the layer's own prims.
 
         Both are the least possible if the sets alone take more than the limit: counting ends there.
         """
-        found = [self._compose((spec.path,)) for spec in self._layer.rootPrims]
+        own = PRIM_BYTES * sum(map(self._num_specs, paths))
+        found = [self._compose((path,), self._limit_bytes + own) for path in paths]
         num_prims = max(sum(each.num_prims for each in found), len(self._below))
-        num_bytes = max(sum(each.num_bytes for each in found), self._num_bytes)
-        return num_prims, num_bytes - PRIM_BYTES * len(self._specs)
+        return num_prims, max(sum(each.num_bytes for each in found), self._num_bytes) - own
 
-    def _compose(self, paths: tuple[Any, ...]) -> _Composed:
+    def _num_specs(self, path: Any) -> int:
+        """Number of the layer's own prims at a path and below."""
+        found: list[Any] = []
+        self._layer.Traverse(path, found.append)
+        return sum(each.IsPrimPath() and not each.ContainsPrimVariantSelection() for each in found)
+
+    def _compose(self, paths: tuple[Any, ...], limit_bytes: int) -> _Composed:
         top = self._prim(paths)
         waiting = [top]
-        while waiting and self._num_bytes <= self._limit_bytes + PRIM_BYTES * len(self._specs):
+        while waiting and self._num_bytes <= limit_bytes:
             prim = waiting[-1]
             if prim.paths in self._below:
                 waiting.pop()
@@ -113,7 +123,6 @@ class _Counter:
                 targets = list(self._targets(spec))
                 num_arcs += len(targets)
                 waiting += targets
-        self._specs.update(found)
         below: dict[str, list[Any]] = {}
         for spec in found.values():
             for child in spec.nameChildren.values():
@@ -127,3 +136,10 @@ class _Counter:
             for item in spec.GetInfo(name).GetAppliedItems():
                 path = getattr(item, "primPath", item)  # of references and payloads; the others are paths
                 yield path or f"/{self._layer.defaultPrim}"
+
+
+def _topmost(paths: Sequence[Any]) -> list[Any]:
+    """Those of the paths that are below no other: what is elsewhere in the layer is composed of itself alone."""
+    outside = [path for path in paths if not path.ContainsPrimVariantSelection()]
+    every = set(outside)
+    return [path for path in outside if not every.intersection(path.GetParentPath().GetPrefixes())]
