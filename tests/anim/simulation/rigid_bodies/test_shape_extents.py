@@ -7,6 +7,7 @@ import weakref
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from anim.simulation.rigid_bodies.description import Shape
 from anim.simulation.rigid_bodies.shape_extents import ShapeExtents, shape_extent
@@ -27,10 +28,10 @@ CORNERS = np.array([[1.0, 0, 0], [3, 0, 0], [1, 4, 0], [1, 0, 4]])
     ],
     ids=lambda value: value.kind if isinstance(value, Shape) else "",
 )
-def test_boxes_and_spheres(shape: Shape, center: object, half_sizes: object, radius: float, reach: float) -> None:
+def test_boxes_and_spheres(shape: Shape, center: ArrayLike, half_sizes: ArrayLike, radius: float, reach: float) -> None:
     found = shape_extent(shape)
-    np.testing.assert_allclose(found.center, center)
-    np.testing.assert_allclose(found.half_sizes, half_sizes, atol=1e-12)
+    np.testing.assert_allclose(found.center, np.array(center))
+    np.testing.assert_allclose(found.half_sizes, np.array(half_sizes), atol=1e-12)
     assert (found.radius, found.reach) == pytest.approx((radius, reach))
 
 
