@@ -105,7 +105,6 @@ def _end_by_signal(source: IO[bytes]) -> None:
     """
     with suppress(ImportError, AttributeError, OSError):  # Windows has none of these
         import fcntl
-        import signal
 
         signal.signal(signal.SIGIO, signal.SIG_DFL)
         fcntl.fcntl(source, fcntl.F_SETOWN, os.getpid())
@@ -135,13 +134,18 @@ def _messages(process: subprocess.Popen[bytes], pipe: IO[bytes]) -> Iterator[Any
 
 
 def _peak_bytes(process: subprocess.Popen[bytes]) -> int:
-    """Most memory that the child had, which ends; 0 if it is unknown: on other systems than Linux, or less than this
-    process had, with which the child's figure starts.
+    """Most memory that the child had, which ends; 0 if it is unknown: on other systems than Linux, where SIGCHLD is
+    ignored, or less than this process had, with which the child's figure starts.
     """
     if sys.platform != "linux" or process.returncode is not None:
         return 0
-    os.kill(process.pid, signal.SIGKILL)  # `process.kill` takes the figures of one that has ended
-    _, status, usage = os.wait4(process.pid, 0)
+    if signal.getsignal(signal.SIGCHLD) is signal.SIG_IGN:  # inherited: the system itself waits for children
+        return 0
+    try:
+        os.kill(process.pid, signal.SIGKILL)  # `process.kill` takes the figures of one that has ended
+        _, status, usage = os.wait4(process.pid, 0)
+    except (ProcessLookupError, ChildProcessError):  # the program around this has waited for all its children
+        return 0
     process.returncode = os.waitstatus_to_exitcode(status)
     import resource  # not on Windows
 

@@ -197,21 +197,21 @@ def _single_layer(path: str, limit_bytes: int) -> Any:
         raise Tf.ErrorException("no layer")
     others = [each for each in layer.GetCompositionAssetDependencies() if each]
     clips: list[str] = []
-    refers = False
+    arcs: list[Any] = []
 
     def look(spec_path: Any) -> None:
-        nonlocal refers
         spec = layer.GetObjectAtPath(spec_path)
         if spec is not None and spec.HasInfo("clips"):
             clips.append(str(spec_path))
-        refers = refers or (spec is not None and any(map(spec.HasInfo, usd_prims.ARCS)))
+        if spec is not None and usd_prims.has_arcs(spec):
+            arcs.append(spec_path)
 
     layer.Traverse(Sdf.Path.absoluteRootPath, look)
     if others or clips:
         other = f"'{others[0]}'" if others else f"value clips at {clips[0]}"
         raise FormatError(f"refers to other files ({other}): only one layer is read", help="flatten the stage")
-    if refers:
-        usd_prims.check_size(layer, limit_bytes)
+    if arcs:
+        usd_prims.check_size(layer, arcs, limit_bytes)
     return layer
 
 

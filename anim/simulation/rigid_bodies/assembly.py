@@ -21,7 +21,8 @@ from anim.simulation.rigid_bodies.rigid_scene import (
     RigidJoint,
     RigidScene,
 )
-from anim.simulation.rigid_bodies.shapes import ScaledShapes, bounding_radius
+from anim.simulation.rigid_bodies.shape_extents import ShapeExtents
+from anim.simulation.rigid_bodies.shapes import ScaledShapes
 
 REST = Motion()
 ZERO: Floats = np.zeros(3)
@@ -44,20 +45,20 @@ def assemble(
     owned = _colliders_by_owner(description, skeleton)
     positions, rotations, _, _ = matrix.decompose(world)
     frames = [Frame(*each) for each in zip(positions, rotations, strict=True)]
-    bodies, shapes = [], ScaledShapes()
+    bodies, shapes, extents = [], ScaledShapes(), ShapeExtents()
     for node, motion in description.motions.items():
         own = owned.get(node, [])
         kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
         kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
-        bodies.append(_body(node, kind, motion, own, description, skeleton, frames, world, shapes))
+        bodies.append(_body(node, kind, motion, own, description, skeleton, frames, world, shapes, extents))
     for node in owned.get(-1, []):
         kind = BodyKind.ANIMATED if is_tracked[node] else BodyKind.STATIC
-        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames, world, shapes))
+        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames, world, shapes, extents))
     indices = {body.node: i for i, body in enumerate(bodies)}
     joints = tuple(_joints(description, skeleton, indices, frames))
     if description.floor is not None:
         bodies.append(_floor(description))
-    return RigidScene(tuple(bodies), joints, gravity)
+    return RigidScene(tuple(bodies), joints, gravity, extents)
 
 
 def _colliders_by_owner(description: PhysicsDescription, skeleton: Skeleton) -> dict[int, list[int]]:
@@ -94,6 +95,7 @@ def _body(
     frames: Sequence[Frame],
     world: Floats,
     shapes: ScaledShapes,
+    extents: ShapeExtents,
 ) -> RigidBody:
     made, frame = [], frames[node]
     for each in colliders:
@@ -101,7 +103,7 @@ def _body(
             made += _collider(each, description.colliders[each], frame, frames[each], world[each], shapes)
         except AnimError as error:
             raise error.at(skeleton.label(each)) from None
-    reach = [float(np.linalg.norm(each.frame.position)) + bounding_radius(each.shape) for each in made]
+    reach = [float(np.linalg.norm(each.frame.position)) + extents.of(each.shape).reach for each in made]
     spin = quaternion.rotate(frame.rotation, np.array(motion.angular_velocity))
     velocity: Floats = np.array(motion.linear_velocity)
     velocity = velocity if motion.velocity_in_world else quaternion.rotate(frame.rotation, velocity)

@@ -12,12 +12,12 @@ from anim.model import Skeleton
 from anim.simulation.rigid_bodies.extents import center_in_scene, scene_center
 from anim.simulation.rigid_bodies.rigid_scene import RigidBody, RigidScene
 
-MAX_DISTANCE_M = 1e7  # steps of float32 are a metre there
+MAX_DISTANCE_M = 1e7  # 10 000 km: steps of float32 are a metre there
 
 
 def check_start(scene: RigidScene, skeleton: Skeleton) -> None:
     """Raise UnsupportedError where a body begins too far from the middle of the moving ones."""
-    positions = np.array([center_in_scene(body) for body in scene.bodies])
+    positions = np.array([center_in_scene(body, scene.extents) for body in scene.bodies])
     _check(positions[None], scene.bodies, scene_center(scene), skeleton)
 
 
@@ -30,8 +30,10 @@ def _check(positions: Floats, bodies: Sequence[RigidBody], center: Floats, skele
     distances = np.linalg.norm(positions - center, axis=-1).max(axis=0)
     for body, distance in zip(bodies, distances.tolist(), strict=True):
         if not distance <= MAX_DISTANCE_M:
+            limit = f"{MAX_DISTANCE_M / 1000:_.0f}".replace("_", " ")
             name = "the floor" if body.node < 0 else skeleton.label(body.node)
             raise UnsupportedError(
-                f"{name} is {distance:.2e} m away from the middle of the moving bodies (limit {MAX_DISTANCE_M:.0e} m: "
-                "steps of float32 are a metre there)"
+                f"{name} is {distance / 1000:.3g} km away from the middle of the moving bodies (limit {limit} km: "
+                "steps of float32 are a metre there)",
+                help="move it nearer, or leave it out of the bodies",
             )

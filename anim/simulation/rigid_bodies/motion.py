@@ -105,7 +105,7 @@ def run_scene(
     round as they began it; the motion is that of the last round.
     Raises UnstableError for a run that diverges, with the Recorder as its report.
     """
-    world = RapierWorld(rigid, steps.step_s)
+    world = RapierWorld(rigid, steps.step_s, skeleton.label)
     states = np.empty((steps.num_steps + 1, len(rigid.moving), 7), np.float32)
     recorder = Recorder(states, steps.step_s, world.center)
     run = _Run(rigid, world, AnimatedBodies(skeleton, clip, rigid, steps), recorder, substeps, finds_impacts)

@@ -55,7 +55,7 @@ def _without_colliders(rigid: RigidScene, skeleton: Skeleton) -> list[str]:
 def _overlaps(rigid: RigidScene, skeleton: Skeleton, motion: RigidMotion) -> list[str]:
     found = []
     for first, second, depth in motion.overlaps:
-        radius = min(body_extent(rigid.bodies[i]).radius or 1e9 for i in (first, second))
+        radius = min(body_extent(rigid.bodies[i], rigid.extents).radius or 1e9 for i in (first, second))
         if depth > MIN_OVERLAP_PER_RADIUS * radius:
             names = [
                 skeleton.label(rigid.bodies[i].node) if rigid.bodies[i].node >= 0 else "the floor"
@@ -106,7 +106,7 @@ def _jumps(rigid: RigidScene, skeleton: Skeleton, clip: Clip) -> list[str]:
             continue
         places = world[:, body.node, :, 3]
         jumps = np.linalg.norm(places[1::2] - places[::2], axis=1)
-        if jumps.max() > MIN_JUMP_PER_RADIUS * body_extent(body).radius:
+        if jumps.max() > MIN_JUMP_PER_RADIUS * body_extent(body, rigid.extents).radius:
             worst = int(jumps.argmax())
             found.append(
                 f"{skeleton.label(body.node)} jumps by {jumps[worst]:.3g} m at {at[worst]:.3g} s (STEP keys): bodies "

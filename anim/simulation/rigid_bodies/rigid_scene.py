@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from anim.arrays import Floats
@@ -15,6 +15,7 @@ from anim.simulation.rigid_bodies.description import (
     Shape,
     Vector,
 )
+from anim.simulation.rigid_bodies.shape_extents import ShapeExtents
 
 WORLD = -1  # index of the body that joints to no body refer to
 
@@ -74,11 +75,12 @@ class RigidJoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidScene:
-    """Bodies, joints and gravity (m/s²)."""
+    """Bodies, joints and gravity (m/s²). extents: of the bodies' shapes, as far as they were asked for."""
 
     bodies: tuple[RigidBody, ...]
     joints: tuple[RigidJoint, ...]
     gravity: Vector
+    extents: ShapeExtents = field(default_factory=ShapeExtents)
 
     @property
     def moving(self) -> list[int]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from anim.arrays import Floats
@@ -12,7 +10,6 @@ from anim.simulation.rigid_bodies.description import Shape
 
 SCALE_TOLERANCE = 1e-4  # relative difference of scales that counts as none: float32 rounding
 SAME_SCALE = 1e-9  # relative difference of scales that is rounding of rotations
-NUM_SHARED = 64  # shapes of many bodies whose extents are kept
 CIRCLE_POINTS, ARC_POINTS = 32, 7
 
 
@@ -96,21 +93,6 @@ def surface_points(shape: Shape) -> Floats:
         for angle in np.linspace(0, np.pi / 2, ARC_POINTS):
             rings.append(_ring(radius * np.cos(angle), side * (height / 2 + radius * np.sin(angle))))
     return np.concatenate(rings)
-
-
-@lru_cache(NUM_SHARED)
-def bounding_radius(shape: Shape) -> float:
-    """Return the largest distance of a shape's points from the origin of its collider, in metres."""
-    offset = float(np.linalg.norm(shape.center))
-    if shape.kind in ("hull", "mesh"):
-        return float(np.linalg.norm(shape.points, axis=1).max())
-    if shape.kind == "box":
-        return offset + float(np.linalg.norm(shape.size)) / 2
-    if shape.kind == "sphere":
-        return offset + shape.size[0]
-    if shape.kind == "plane":
-        return offset
-    return offset + float(np.linalg.norm(surface_points(shape), axis=1).max())
 
 
 def _ring(radius: float, y: float) -> Floats:

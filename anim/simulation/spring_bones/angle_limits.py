@@ -16,7 +16,7 @@ import numpy as np
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
-from anim.simulation.spring_bones.colliders import check_quantity
+from anim.simulation.spring_bones.colliders import check_numbers, check_quantity
 from anim.simulation.spring_bones.collisions import TINY, cofactors, norms
 
 SINGULAR = 1e-12  # length of a direction's part across an axis, below which it is along the axis
@@ -37,7 +37,7 @@ class AngleLimit:
 
     angle: rad, of a cone or hinge, or the pitch of a spherical limit; more than π is π. yaw: rad, of a spherical limit;
     more than π/2 is π/2. rotation: unit quaternion xyzw of the limit from the bone at rest.
-    Raises RangeError for negative angles and a rotation without length.
+    Raises RangeError for negative angles, numbers that are not finite, and a rotation without length.
     """
 
     shape: LimitShape
@@ -50,8 +50,8 @@ class AngleLimit:
         check_quantity(self.yaw, "yaw", least=0.0)
         for name in ("angle", "yaw"):
             object.__setattr__(self, name, float(getattr(self, name)))  # numpy has no type for the integers of JSON
-        x, y, z, w = map(float, self.rotation)
-        if not (np.isfinite((x, y, z, w)).all() and np.linalg.norm((x, y, z, w))):
+        x, y, z, w = check_numbers(self.rotation, "rotation", 4)
+        if not np.linalg.norm((x, y, z, w)):
             raise RangeError(f"rotation is {self.rotation} (expected a unit quaternion)")
         object.__setattr__(self, "rotation", (x, y, z, w))
 

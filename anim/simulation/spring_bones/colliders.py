@@ -53,19 +53,34 @@ class Collider:
 
 def check_vector(value: object, name: str) -> Vector:
     """Return three finite numbers as a tuple. Raises ShapeError or RangeError otherwise."""
+    x, y, z = check_numbers(value, name, 3)
+    return x, y, z
+
+
+def check_numbers(value: object, name: str, count: int) -> tuple[float, ...]:
+    """Return `count` finite numbers as a tuple of floats. Raises ShapeError or RangeError otherwise."""
     try:
-        numbers = tuple(float(each) for each in value)  # type: ignore[attr-defined]
+        numbers = tuple(_as_float(each) for each in value)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
-        raise ShapeError(f"{name} is {value!r} (expected three numbers)") from None
-    if len(numbers) != 3:
-        raise ShapeError(f"{name} has {len(numbers)} numbers (expected 3)")
+        raise ShapeError(f"{name} is {value!r} (expected {count} numbers)") from None
+    if len(numbers) != count:
+        raise ShapeError(f"{name} has {len(numbers)} numbers (expected {count})")
     if not all(map(math.isfinite, numbers)):
         raise RangeError(f"{name} holds {next(x for x in numbers if not math.isfinite(x))} (expected finite numbers)")
-    return numbers[0], numbers[1], numbers[2]
+    return numbers
 
 
 def check_quantity(value: float, name: str, *, least: float, most: float = math.inf) -> None:
     """Raise RangeError unless `value` is a finite number from `least` to `most`."""
-    if not (math.isfinite(value) and least <= value <= most):
+    number = _as_float(value)
+    if not (math.isfinite(number) and least <= number <= most):
         limit = f"{least:g} to {most:g}" if math.isfinite(most) else f"{least:g} or more"
-        raise RangeError(f"{name} is {value:g} (expected {limit})")
+        raise RangeError(f"{name} is {number:g} (expected {limit})")
+
+
+def _as_float(value: float) -> float:
+    """A number as a float; infinity for an integer beyond all floats."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf

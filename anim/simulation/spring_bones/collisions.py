@@ -45,7 +45,7 @@ class Collisions:
     def __init__(
         self, colliders: Sequence[Collider], chosen: Sequence[Sequence[int]], hit_radius: Floats, rows: Ints
     ) -> None:
-        """Prepare the rounds.
+        """Pair joints with their colliders, in blocks.
 
         chosen: for each joint (m) the indices of its colliders. hit_radius: (m,). rows: (C,) of the colliders' nodes in
         the world matrices.

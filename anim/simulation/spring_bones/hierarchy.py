@@ -84,8 +84,9 @@ def _check_joint(skeleton: Skeleton, subtrees: tuple[Ints, Ints], depths: Ints, 
         )
     if (count := int(depths[joint.tail] - depths[joint.node])) > MAX_TAIL_NODES:
         raise UnsupportedError(
-            f"{skeleton.label(joint.tail)} is {count} nodes below {skeleton.label(joint.node)}, whose tail it is "
-            f"(limit {MAX_TAIL_NODES})"
+            f"the tail of {skeleton.label(joint.node)} is {count} nodes below it, {skeleton.label(joint.tail)} (limit "
+            f"{MAX_TAIL_NODES})",
+            help="make the nodes between them joints of the spring",
         )
 
 

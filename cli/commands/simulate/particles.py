@@ -263,7 +263,9 @@ def _radius(size: str, scene: Scene) -> float:
     """Radius of a particle in m. Raises DataRangeError for a model that has no size, or one beyond all numbers."""
     radius = units.parse_length(size, "--size", lambda: diagonal(scene))
     if not 0 < radius < math.inf:
-        problem = f"{size} of the model, which is {diagonal(scene):.3g} m large, is no radius of a particle"
+        problem = (
+            f"--size is {size} of the model, whose diagonal is {diagonal(scene):.3g} m (expected a radius above 0)"
+        )
         raise DataRangeError(problem, help="choose --size, such as 2cm")
     return radius
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from anim.caches import child_process
 from anim.caches.child_process import ChildEndedError, run_in_child
 from anim.errors import FormatError, UnsupportedError
 from anim.model import FrameChunk, VertexCache
@@ -127,6 +129,7 @@ def test_memory_has_a_limit() -> None:
 
 PARENT = """
 import sys
+from anim.caches import child_process
 from anim.caches.child_process import run_in_child
 from tests.anim.caches import test_child_process
 with run_in_child(getattr(test_child_process, sys.argv[1]), sys.argv[2], limit_bytes=10**9) as messages:
@@ -150,6 +153,37 @@ def test_the_child_ends_with_a_parent_that_is_killed(work: str, tmp_path: Path) 
     parent.kill()
     parent.communicate()
     wait_until(lambda: not is_running(child))
+
+
+ENDING = """
+import signal
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+from anim.caches import child_process
+from anim.caches.child_process import ChildEndedError, run_in_child
+from tests.anim.caches import test_child_process
+try:
+    with run_in_child(test_child_process.crashed, limit_bytes=10**9) as messages:
+        list(messages)
+except ChildEndedError as error:
+    print("ended", error.peak_bytes)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGCHLD"), reason="a signal of POSIX")
+def test_a_child_ends_where_its_signal_is_ignored() -> None:
+    """Programs that ignore it hand that down to what they start; nobody can wait for children there."""
+    run = subprocess.run(
+        [sys.executable, "-c", ENDING], cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120
+    )
+    assert (run.stdout, run.stderr) == ("ended 0\n", "")
+
+
+@pytest.mark.skipif(not hasattr(os, "WNOWAIT"), reason="waits of POSIX")
+def test_a_child_that_another_has_waited_for_tells_no_memory() -> None:
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    os.waitpid(process.pid, 0)
+    assert child_process._peak_bytes(process) == 0
+    assert process.wait() == 0
 
 
 def wait_until(holds: Callable[[], bool]) -> None:

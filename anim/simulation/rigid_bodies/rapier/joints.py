@@ -56,7 +56,8 @@ def find_approximations(joint: RigidJoint) -> list[str]:
         *["soft limits of a range are hard"] * soft_ranges,
         *["a least distance of 2 or 3 axes is ignored"] * least,
         *["a limit of the angle about 3 axes is one of the swing, and one of the twist"] * (3 in angles),
-        *["of several limits of angles about 2 or 3 axes, all but the first are one of each axis"] * (len(angles) > 1),
+        *["of several limits of angles about 2 or 3 axes, the second and later ones hold for each axis by itself"]
+        * (len(angles) > 1),
     ]
 
 

@@ -45,7 +45,10 @@ def plane_reach(scene: RigidScene) -> float:
 def _spread(scene: RigidScene) -> float:
     """Largest distance in metres of a moving body from the middle of all."""
     center = scene_center(scene)
-    return max((float(np.linalg.norm(center_in_scene(scene.bodies[i]) - center)) for i in scene.moving), default=0.0)
+    return max(
+        (float(np.linalg.norm(center_in_scene(scene.bodies[i], scene.extents) - center)) for i in scene.moving),
+        default=0.0,
+    )
 
 
 def scale_scene(scene: RigidScene, units: float) -> RigidScene:

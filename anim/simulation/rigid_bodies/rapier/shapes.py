@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -27,8 +28,14 @@ MAX_AREA, MAX_AREA_OF_SCENE = 25.0, 250.0
 class ShapeBuilder:
     """Builder of Rapier's shapes for the colliders of a scene, and of the masses of its bodies."""
 
-    def __init__(self, scene: RigidScene, center: Floats, reach: float, units: float) -> None:
-        """center: (3,), near the bodies. reach: half the size of a plane's box. units: of length, per metre."""
+    def __init__(
+        self, scene: RigidScene, center: Floats, reach: float, units: float, label: Callable[[int], str]
+    ) -> None:
+        """center: (3,), near the bodies. reach: half the size of a plane's box. units: of length, per metre.
+
+        label: of a node, for messages.
+        """
+        self._label = label
         self._rapier, self._scene, self._center = load_package(), scene, center
         self._reach, self._units = reach, units
         self._has_hulls = any(each.shape.kind in ("hull", "mesh") for body in scene.bodies for each in body.colliders)
@@ -62,7 +69,7 @@ class ShapeBuilder:
             return make.trimesh(points, faces)
         areas = _areas(points, faces)
         if not areas.any():
-            raise _flat(collider)
+            raise self._flat(collider)
         corners = points[np.unique(faces[areas > 0])]
         hull = self._hull(corners, collider)
         is_convex = _volume(make.trimesh(points, faces)) >= CONVEX_VOLUME_FRACTION * _volume(hull)
@@ -76,12 +83,12 @@ class ShapeBuilder:
         area = float(areas.sum()) / float(np.ptp(points, axis=0).max()) ** 2
         self._area += area
         if area > MAX_AREA or self._area > MAX_AREA_OF_SCENE:
-            which, found, most = "mesh", area, MAX_AREA
+            which, found, most = f"the mesh of {self._label(collider.node)} is", area, MAX_AREA
             if area <= MAX_AREA:
-                which, found, most = "meshes so far", self._area, MAX_AREA_OF_SCENE
+                which, found, most = "all concave dynamic meshes together are", self._area, MAX_AREA_OF_SCENE
             raise UnsupportedError(
-                f"the {which} of the collider of node {collider.node} can't be divided into convex pieces: the area of "
-                f"its triangles is {found:.3g} times the square of its size (limit {most:g})",
+                f"{which} too large to divide into convex pieces: area {found:.3g} (limit {most:g}, in squares of each "
+                "mesh's size)",
                 help="choose its hull: `shape` hull, or convexHull in the file",
             )
 
@@ -104,11 +111,15 @@ class ShapeBuilder:
 
     def _hull(self, points: Any, collider: BodyCollider) -> Any:
         if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1] <= 1e-6 * np.ptp(points):
-            raise _flat(collider)
+            raise self._flat(collider)
         try:
             return self._rapier.SharedShape.convex_hull(points)
         except Exception:  # the package raises a plain one
-            raise _flat(collider) from None
+            raise self._flat(collider) from None
+
+    def _flat(self, collider: BodyCollider) -> FormatError:
+        problem = f"the collider of {self._label(collider.node)} is flat: its hull has no volume"
+        return FormatError(problem, help="give its mesh a thickness")
 
     def mass(self, body: RigidBody, shapes: list[Any]) -> Any:
         """Mass, center and inertia: those of the colliders, unless the motion gives its own."""
@@ -143,11 +154,6 @@ class ShapeBuilder:
         solid = self._rapier.SharedShape.trimesh(points, faces)
         is_closed = 0 < _volume(solid) <= _volume(shape) * 1.5
         return solid if is_closed else shape
-
-
-def _flat(collider: BodyCollider) -> FormatError:
-    problem = f"the collider of node {collider.node} is flat: its hull has no volume"
-    return FormatError(problem, help="give its mesh a thickness")
 
 
 def _areas(points: Any, faces: Any) -> Floats:

@@ -9,6 +9,7 @@ its parabola. All velocities begin half a substep earlier, as in leapfrog; then 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -35,9 +36,12 @@ MAX_RECYCLED_M = 1e-3  # motion since the distances of contacts were measured; i
 
 
 class RapierWorld:
-    """World of a scene's bodies. step: s. States are those of `scene.moving`, in this order."""
+    """World of a scene's bodies. step: s. label: of a node, for messages.
 
-    def __init__(self, scene: RigidScene, step: float) -> None:
+    States are those of `scene.moving`, in this order.
+    """
+
+    def __init__(self, scene: RigidScene, step: float, label: Callable[[int], str] = "node {}".format) -> None:
         self._rapier = load_package()
         self._units = choose_unit(scene)
         reach = self._units * plane_reach(scene)
@@ -53,14 +57,15 @@ class RapierWorld:
         parameters.normalized_max_linear_velocity = self._units * MAX_SPEED_M_S  # its own is 400 m/s
         self._early = -0.5 * step / SUBSTEPS * np.array(scene.gravity)
         self._groups = interaction_groups(scene)
-        self._shapes = ShapeBuilder(scene, self._center, reach, self._units)
+        self._shapes = ShapeBuilder(scene, self._center, reach, self._units, label)
         materials = [each.material for body in scene.bodies for each in body.colliders]
         self._friction = FrictionHooks(materials, step, self._units)
         self._colliders: dict[int, tuple[int, BodyCollider]] = {}
         self._handles = [self._add_body(i, body) for i, body in enumerate(scene.bodies)]
         self._bodies = [world.rigid_bodies[handle] for handle in self._handles]
         owners = {index: body for index, (body, _) in self._colliders.items()}
-        self._slip = SlipReader(world, self._bodies, [body_extent(body).radius for body in scene.bodies], owners)
+        radii = [body_extent(body, scene.extents).radius for body in scene.bodies]
+        self._slip = SlipReader(world, self._bodies, radii, owners)
         self._weighed: list[tuple[Any, float]] = []
         self._read = [self._bodies[i] for i in scene.moving]
         anchor = world.add_body(self._rapier.RigidBody.fixed().translation(tuple(-self._center)))

@@ -19,7 +19,7 @@ from anim.simulation.rigid_bodies.description import CollisionFilter, Material, 
 from anim.simulation.rigid_bodies.motion import RigidMotion, run_scene
 from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.rigid_scene import BodyCollider, BodyKind, Frame, RigidBody, RigidJoint, RigidScene
-from anim.simulation.rigid_bodies.shapes import bounding_radius
+from anim.simulation.rigid_bodies.shape_extents import shape_extent
 from anim.simulation.rigid_bodies.simulate import RigidRun, read_description, simulate_rigid_bodies
 from anim.simulation.steps import Steps
 
@@ -48,7 +48,7 @@ def body(
     own: CollisionFilter | None = None,
 ) -> RigidBody:
     made = [] if shape is None else [BodyCollider(0, shape, ORIGIN, material or Material(), own or CollisionFilter())]
-    radius = 0.0 if shape is None else bounding_radius(shape)
+    radius = 0.0 if shape is None else shape_extent(shape).reach
     return RigidBody(
         0,
         kind,

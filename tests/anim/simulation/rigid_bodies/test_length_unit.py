@@ -16,6 +16,7 @@ from anim.simulation.rigid_bodies.notes import find_notes
 from anim.simulation.rigid_bodies.rapier import world
 from anim.simulation.rigid_bodies.rapier.length_unit import ENLARGED_RADIUS_UNITS, choose_unit, plane_reach, scale_scene
 from anim.simulation.rigid_bodies.rigid_scene import BodyKind, RigidBody, RigidJoint, RigidScene
+from anim.simulation.rigid_bodies.shape_extents import ShapeExtents
 from tests.anim.simulation.rigid_bodies.cases import NO_CLIP, ORIGIN, G, body, ground, needs_rapier, path, run
 from tests.anim.simulation.rigid_bodies.test_joints import LOCKED, NO_TURN, swing
 from tests.clips import skeleton
@@ -106,10 +107,10 @@ def test_the_radius_of_a_body_is_that_of_its_shapes() -> None:
     corners = 0.02 * np.array(list(product((-1, 1), repeat=3)))
     sphere = Shape("sphere", (0.03,), center=(3.0, 0.0, 0.0))
     for shape, radius in ((Shape("hull", points=corners + np.array([1.0, 0, 0])), 0.02 * 3**0.5), (sphere, 0.03)):
-        center, found = body_extent(body(shape, (5, 5, 5)))
+        center, found = body_extent(body(shape, (5, 5, 5)), ShapeExtents())
         np.testing.assert_allclose(found, radius)
         assert center[0] in (1.0, 3.0)
-    assert body_extent(body(None)).radius == body_extent(ground()).radius == 0.0
+    assert body_extent(body(None), ShapeExtents()).radius == body_extent(ground(), ShapeExtents()).radius == 0.0
 
 
 def bolt(position: ArrayLike = (0, 0, 0), velocity: ArrayLike = (0, 0, 0), size: float = 1e-3) -> RigidBody:

@@ -37,7 +37,7 @@ def test_a_needle_is_its_hull() -> None:
     thin = [1, 1e-3, 1e-3]
     points = np.array([[0.7, 0.3, 0.1], [0.3, 0.9, 0.8], [0.0, 0.2, 0.3], [0.9, 0.4, 0.2]]) * thin
     needle = body(mesh(points, [[3, 2, 0], [0, 1, 2]]))
-    builder = ShapeBuilder(RigidScene((needle,), (), (0, 0, 0)), np.zeros(3), 1.0, 1.0)
+    builder = ShapeBuilder(RigidScene((needle,), (), (0, 0, 0)), np.zeros(3), 1.0, 1.0, "node {}".format)
     assert builder.build(needle.colliders[0], needle).as_convex_polyhedron() is not None
 
 
@@ -45,7 +45,9 @@ def test_a_needle_is_its_hull() -> None:
 def test_crossing_triangles_are_refused_before_they_are_divided() -> None:
     points = np.random.default_rng(0).random((400, 3))
     faces = [[0, i, i + 1] for i in range(1, 398)]
-    with pytest.raises(UnsupportedError, match=r"is 66.* times the square of its size \(limit 25\)") as caught:
+    with pytest.raises(
+        UnsupportedError, match=r"the mesh of node 0 is too large .*: area 66.* \(limit 25, in squares"
+    ) as caught:
         run(body(mesh(points, faces)))
     assert "hull" in caught.value.help
 
@@ -58,7 +60,7 @@ def test_all_meshes_of_a_scene_have_a_limit(monkeypatch: pytest.MonkeyPatch) -> 
     faces = [*sides, *caps, *([c + 5, b + 5, a + 5] for a, b, c in caps)]
     run(*(body(mesh(depth, faces), (4 * i, 0, 0)) for i in range(2)), seconds=0.01)
     monkeypatch.setattr(shapes, "MAX_AREA_OF_SCENE", 4.0)
-    with pytest.raises(UnsupportedError, match=r"the meshes so far .* \(limit 4\)"):
+    with pytest.raises(UnsupportedError, match=r"all concave dynamic meshes together are .* \(limit 4, in"):
         run(*(body(mesh(depth, faces), (4 * i, 0, 0)) for i in range(2)))
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from anim.errors import AnimError, FormatError, NotFoundError, RangeError, UnstableError, UnsupportedError
+from anim.errors import AnimError, FormatError, NotFoundError, RangeError, ShapeError, UnstableError, UnsupportedError
 from anim.model import Clip
 from anim.simulation.spring_bones import hierarchy, plan
+from anim.simulation.spring_bones.angle_limits import AngleLimit, LimitShape
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.simulate import SpringOptions, simulate_springs
@@ -160,5 +162,35 @@ def test_a_chain_of_too_many_joints_is_refused_before_it_moves(monkeypatch: pyte
 def test_a_tail_many_nodes_below_its_joint_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hierarchy, "MAX_TAIL_NODES", 1)
     far = SpringBones((replace(ONE, joints=(SpringJoint(1, 3, SOFT),)),))
-    with pytest.raises(UnsupportedError, match=r"node 3 '3' is 2 nodes below node 1 '1', whose tail it is \(limit 1\)"):
+    with pytest.raises(
+        UnsupportedError, match=r"the tail of node 1 '1' is 2 nodes below it, node 3 '3' \(limit 1\)"
+    ) as caught:
         simulate_springs(CHAIN, swaying(), far)
+    assert caught.value.help == "make the nodes between them joints of the spring"
+
+
+HUGE = 10**400
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: AngleLimit(LimitShape.CONE, 1.0, rotation=(HUGE, 0, 0, 1)),
+        lambda: AngleLimit(LimitShape.CONE, HUGE),
+        lambda: Collider(0, ColliderShape.SPHERE, offset=(0, -HUGE, 0)),
+        lambda: Collider(0, ColliderShape.SPHERE, radius=HUGE),
+        lambda: SpringParameters(stiffness=HUGE),
+        lambda: SpringParameters(gravity=(0, HUGE, 0)),
+    ],
+    ids=["rotation", "angle", "offset", "radius", "stiffness", "gravity"],
+)
+def test_integers_beyond_all_floats_are_out_of_range(make: Callable[[], object]) -> None:
+    with pytest.raises(RangeError, match=r"(is|holds) -?inf \(expected"):
+        make()
+
+
+def test_a_rotation_has_four_numbers() -> None:
+    with pytest.raises(ShapeError, match=r"rotation has 3 numbers \(expected 4\)"):
+        AngleLimit(LimitShape.CONE, 1.0, rotation=(0, 0, 1))  # type: ignore[arg-type]
+    with pytest.raises(RangeError, match="expected a unit quaternion"):
+        AngleLimit(LimitShape.CONE, 1.0, rotation=(0, 0, 0, 0))
