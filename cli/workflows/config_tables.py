@@ -64,7 +64,9 @@ def _table(path: Path) -> dict[str, Any] | None:
         return None
     except RecursionError:
         raise UsageError(f"{path}: is nested too deep") from None
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: is no TOML: byte {error.start} is not UTF-8") from None
+    except (OSError, tomllib.TOMLDecodeError) as error:
         raise UsageError(f"{path}: {error}") from None
     except ValueError:  # Python's limit of digits
         raise UsageError(f"{path}: has a whole number of thousands of digits (TOML has 64 bits)") from None

@@ -191,3 +191,10 @@ def test_the_exit_code_of_a_budget_report_is_in_the_help(folder: Path, call: Cal
     (folder / "gltf-anim.toml").write_text('[[budget]]\nmatch = "noop.glb"\nbytes = 1\n')
     assert call("check", "noop.glb", "--budget-report").code == 0
     assert "exit 0 above them too" in " ".join(call("check", "--help").text.split())
+
+
+def test_settings_that_are_no_text_are_refused(folder: Path, call: Call) -> None:
+    (folder / "gltf-anim.toml").write_bytes(b"glTF\x02\x00\x00\x00\x88")
+    run = call("check", "noop.glb")
+    assert run.code == 2
+    assert "gltf-anim.toml: is no TOML: byte 8 is not UTF-8" in run.err

@@ -8,7 +8,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from anim.arrays import Ints
+from anim.arrays import Floats, Ints
+from anim.errors import FormatError
 from anim.exchange.euler.curve import Curve, Mode
 from anim.exchange.euler.motion import EulerMotion, EulerNode
 from anim.model import TimeAxis
@@ -56,6 +57,15 @@ def shift_to_zero(times: Iterable[float]) -> tuple[float, tuple[str, ...]]:
     if first >= 0:
         return 0.0, ()
     return -first, (f"the first key is at {first:.6g} s: all are moved by {-first:.6g} s, to begin at 0",)
+
+
+def move_times(times: Floats, later: float) -> Floats:
+    """Return increasing times (K,) `later` seconds later. Raises FormatError for keys that fall together there."""
+    moved = times + later
+    for k in np.flatnonzero(np.diff(moved) <= 0)[:1] + 1:
+        apart = f"keys {k - 1} and {k} are {times[k] - times[k - 1]:.3g} s apart"
+        raise FormatError(f"{apart}, which float64 doesn't hold {later:.3g} s later, where the first key is at 0 s")
+    return moved
 
 
 class Float32Times:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
+from anim.exchange.euler.baked_keys import move_times
 from anim.exchange.euler.curve import DEFAULT_WEIGHT, MODES, Curve, Mode
 from anim.exchange.formats.text import check_times, error_at, parse_cell
 from anim.model import TimeAxis
@@ -17,7 +18,7 @@ def curve_from_rows(rows: list[KeyRow], later: float, unit: float) -> Curve:
     lines = [line for line, _ in rows]
     times = np.array([parse_cell(row["time"], line, "time") for line, row in rows])
     check_times(times, lines)
-    axis = TimeAxis(times + later)
+    axis = TimeAxis(move_times(times, later))
     values = np.array([parse_cell(row["value"], line, "value") for line, row in rows]) * unit
     modes = np.zeros(len(rows), np.uint8)
     for i, (line, row) in enumerate(rows):

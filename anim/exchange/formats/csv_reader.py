@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, freeze
 from anim.errors import FormatError
-from anim.exchange.euler.baked_keys import shift_to_zero
+from anim.exchange.euler.baked_keys import move_times, shift_to_zero
 from anim.exchange.euler.convention import PartialConvention, merge_strict, parse_convention, require_complete
 from anim.exchange.euler.curve import MODES, Curve, Mode, uniform_modes
 from anim.exchange.euler.motion import Convention, EulerMotion
@@ -226,7 +226,8 @@ def _read_frames(file: _File, drafts: _NodeBuilders, later: float) -> None:
     columns = np.array([_row_numbers(cells) for _, cells in file.rows]).T.copy()
     times = columns[0]
     check_times(times, [line for line, _ in file.rows])
-    times, axes = times + later, dict[bytes, tuple[TimeAxis, NDArray[np.uint8]]]()  # and modes, by keys that are there
+    times = move_times(times, later)
+    axes: dict[bytes, tuple[TimeAxis, NDArray[np.uint8]]] = {}  # and modes, by keys that are there
     is_there = ~np.isnan(columns)
     is_full = is_there.all(axis=1).tolist()
     for column, title in enumerate(file.header[1:], 1):

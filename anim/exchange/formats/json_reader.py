@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 
 from anim.arrays import Floats, freeze
 from anim.errors import FormatError
-from anim.exchange.euler.baked_keys import shift_to_zero
+from anim.exchange.euler.baked_keys import move_times, shift_to_zero
 from anim.exchange.euler.convention import (
     UNSPECIFIED,
     PartialConvention,
@@ -148,7 +148,7 @@ class _TimeAxes:
         """Return the axis of times (K,) in seconds."""
         content = times.tobytes()
         if content not in self._found:
-            self._found[content] = TimeAxis(times + self._later)
+            self._found[content] = TimeAxis(move_times(times, self._later))
         return self._found[content]
 
 

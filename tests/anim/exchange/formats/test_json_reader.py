@@ -132,6 +132,13 @@ def test_keys_before_zero_come_later_all_by_as_much() -> None:
     assert _read(CURVES).notes == ()
 
 
+def test_keys_that_the_shift_brings_together_are_named() -> None:
+    content = _changed("nodes/0/curves/rotation.x/times", [0, 1e-30])
+    content["nodes"][0]["curves"]["rotation.y"]["times"] = [-1e8, 0, 1]
+    with pytest.raises(FormatError, match="keys 0 and 1 are 1e-30 s apart, which float64 doesn't hold 1e\\+08 s later"):
+        _read(content)
+
+
 @pytest.mark.parametrize(
     ("path", "value", "problem"),
     [
