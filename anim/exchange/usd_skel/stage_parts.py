@@ -100,7 +100,10 @@ class Placement:
     """
 
     def __init__(self, prims: Sequence[Any], *, moves: bool) -> None:
-        self._prims, self._moves = prims, moves
+        from pxr import UsdGeom
+
+        self._prims, self._moves = [each.GetPrim() for each in prims], moves
+        self._cache = UsdGeom.XformCache()  # ancestors once, and operations once for all times
         self._matrices = self._computed(0.0)
 
     def world(self, points: Floats, owner: Ints, code: float) -> Floats:
@@ -112,7 +115,8 @@ class Placement:
         return np.asarray(np.einsum("vi,vij->vj", points, own[:, :3, :3]) + own[:, 3, :3])
 
     def _computed(self, code: float) -> Floats:
-        return np.array([each.ComputeLocalToWorldTransform(code) for each in self._prims], np.float64)
+        self._cache.SetTime(code)
+        return np.array([self._cache.GetLocalToWorldTransform(each) for each in self._prims], np.float64)
 
 
 def _owners(rows: Sequence[Floats]) -> Ints:
