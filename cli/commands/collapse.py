@@ -88,12 +88,14 @@ def command(
             progress(done + 1)
         progress.close()
     seen = CollapseReport(source.name, comparison.meshes, methods, bulge_clamp, fps, found, reporter.warnings)
-    if plot is not None:
-        _draw(seen, plot, reporter)
     if format is Format.JSON:
-        documents.write_text(collapse_report.as_json(seen))
-    elif not quiet:
-        documents.write_text(collapse_report.text(seen, every=verbose))
+        words = collapse_report.as_json(seen)
+    else:
+        words = "" if quiet else collapse_report.text(seen, every=verbose)
+    if plot is not None:  # with a report that is complete: without it the picture stays as it was
+        _draw(seen, plot, reporter)
+    if words:
+        documents.write_text(words)
 
 
 def _check(fps: float, plot: str | None) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from anim.errors import AnimError
@@ -130,11 +130,14 @@ def command(
         from cli.workflows.vertex_diff import diff_by_vertex
 
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, reporter, opened=opened)
+        words = _vertex_words(found_by_vertex, format, reporter, quiet=quiet)
         if html is not None:
             from cli.workflows.cache_page import write_vertex_page
 
             write_vertex_page(html, old, new, clip or (), found_by_vertex, reporter)
-        _by_vertex(found_by_vertex, format, fail_above, reporter, quiet=quiet)
+        if words:
+            documents.write_text(words)
+        _check_vertices(found_by_vertex, fail_above)
         return
     assert one is not None
     assert other is not None
@@ -158,16 +161,20 @@ def command(
     for words in () if report.are_strangers else found.warnings:
         reporter.warn(f"{other.file.name}: {words}")
     if format is Format.JSON:
-        documents.write_text(diff_report.as_json(report, warnings=reporter.warnings))
-    elif not quiet:
-        documents.write_text(diff_report.text(report))
+        words = diff_report.as_json(report, warnings=reporter.warnings)
+    else:
+        words = "" if quiet else diff_report.text(report)
+    with ExitStack() as stack:  # one output that fails leaves the files as they were
+        if plot is not None:
+            drawn = draw_errors(report, ruler, one.clips, other.clips, kind=kind, limit=limit)
+            stack.enter_context(documents.commit_text_after(drawn, plot))
+        if words:
+            documents.write_text(words)
+        if html is not None:
+            assert new is not None
+            _write_page(html, report, ruler, (old, one), (new, other), reporter)
     if plot is not None:
-        drawn = draw_errors(report, ruler, one.clips, other.clips, kind=kind, limit=limit)
-        documents.write_bytes([np.frombuffer(drawn, np.uint8)], plot)
         reporter.info(f"{plot}  {format_bytes(len(drawn))}")
-    if html is not None:
-        assert new is not None
-        _write_page(html, report, ruler, (old, one), (new, other), reporter)
     if limit is not None:
         _check(report, limit)
 
@@ -200,14 +207,15 @@ def _is_cache(path: str | None) -> bool:
     return is_cache(path)
 
 
-def _by_vertex(
-    report: VertexReport, format: Format, fail_above: str | None, reporter: Reporter, *, quiet: bool
-) -> None:
-    """Write the report of caches and bakes, and check the limit."""
+def _vertex_words(report: VertexReport, format: Format, reporter: Reporter, *, quiet: bool) -> str:
+    """The report of caches and bakes, "" for none."""
     if format is Format.JSON:
-        documents.write_text(vertex_report.as_json(report, warnings=reporter.warnings))
-    elif not quiet:
-        documents.write_text(vertex_report.text(report))
+        return vertex_report.as_json(report, warnings=reporter.warnings)
+    return "" if quiet else vertex_report.text(report)
+
+
+def _check_vertices(report: VertexReport, fail_above: str | None) -> None:
+    """Raise CheckError if a vertex of caches and bakes is farther away than the limit."""
     limit = None if fail_above is None else _length(fail_above, "--fail-above", report.found.diagonal)
     if limit is not None and report.found.max_error > limit:
         worst = f"{format_length(report.found.max_error)} at vertex {report.vertex}, {report.found.time:.3f} s"

@@ -24,6 +24,8 @@ from anim.exchange.retarget.retarget import GroundMode
 from anim.exchange.split_skins import split_by_root
 from anim.exchange.stick_mesh import stick_mesh
 from anim.gltf import authoring
+from anim.gltf.document import Document
+from anim.gltf.io.source import Source
 from anim.maths.euler import AxesConvention, check_order
 from cli import text, units
 from cli.errors import UsageError
@@ -150,7 +152,7 @@ def command(
         bones = converted.skeleton
         bodies = split_by_root(bones, *stick_mesh(bones, converted.ends)) if mesh is Mesh.STICKS else []
         document = authoring.build_document(bones, [converted.clip], bodies)
-        before, size = len(data), documents.write(document, output, None, dry_run=dry_run, reporter=reporter)
+        before, size = len(data), _write(made, document, output, None, format, reporter, dry_run=dry_run)
     else:
         names = pairs(alias)
         with documents.source(onto, reporter) as character:
@@ -159,14 +161,8 @@ def command(
             made = named(made, character.document, name=name, replaced=taken)
             casting = CharacterOptions(names, floor, bind_time, fail_unmatched, taken)
             made, document = put_on_character(made, character, casting, reporter)
-            before, size = (
-                character.size,
-                documents.write(document, output, character, dry_run=dry_run, reporter=reporter),
-            )
-    for each in from_euler_report.warnings(made):
-        reporter.warn(each)
-    if format is Format.JSON:
-        documents.write_text(from_euler_report.as_json(made, warnings=reporter.warnings))
+            before = character.size
+            size = _write(made, document, output, character, format, reporter, dry_run=dry_run)
     for line in from_euler_report.lines(made, verbose=verbose):
         reporter.info(line)
     parts = [
@@ -175,6 +171,29 @@ def command(
     ]
     ending = " (dry run: nothing written)" if dry_run else ""
     reporter.info(f"{', '.join(parts)}, {text.format_duration(time.perf_counter() - began)}{ending}")
+
+
+def _write(
+    made: ConversionReport,
+    document: Document,
+    output: str,
+    source: Source | None,
+    format: Format,
+    reporter: text.Reporter,
+    *,
+    dry_run: bool,
+) -> int:
+    """Write the file, and the report if it is JSON, which is made before: without it nothing changes. Return the size.
+
+    source: the document's input, if it is one's.
+    """
+    for each in from_euler_report.warnings(made):
+        reporter.warn(each)
+    found = from_euler_report.as_json(made, warnings=reporter.warnings) if format is Format.JSON else ""
+    size = documents.write(document, output, source, dry_run=dry_run, reporter=reporter)
+    if found:
+        documents.write_text(found)
+    return size
 
 
 def _check(

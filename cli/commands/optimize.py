@@ -206,12 +206,13 @@ def command(
                 wanted, found = ByteLimit(work, max_count, wanted, ceiling).run()
             optimize_report.check(found, work.clips, wanted, work.scale)
             about = optimize_outputs.describe(work, wanted, found, began)
-            with optimize_outputs.write_report(about, reporter, report, dry_run=dry_run):
+            with (
+                optimize_outputs.write_report(about, reporter, report, dry_run=dry_run),
+                optimize_outputs.write_comparison(about, reporter, html, input, dry_run=dry_run),
+            ):
                 documents.write(about.after, output, source, dry_run=dry_run, reporter=reporter)
         optimize_outputs.report_result(about, reporter, dry_run=dry_run)
         if not dry_run:
-            if html is not None:
-                optimize_outputs.write_comparison(html, input, about, reporter)
             note_images(about.after, source, output, reporter)
 
     return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)

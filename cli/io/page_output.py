@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePath
 
@@ -54,7 +55,29 @@ def write_page(
     title: str = "",
 ) -> None:
     """Write a page, and report its size. panels: before those of the content."""
+    with commit_page_after(path, file, other, reporter, content=content, panels=panels, view=view, title=title):
+        pass
+
+
+@contextmanager
+def commit_page_after(
+    path: str,
+    file: PageFile,
+    other: PageFile | None,
+    reporter: Reporter,
+    *,
+    content: PageContent = EMPTY,
+    panels: Sequence[PagePanel] = (),
+    view: PageView = START_VIEW,
+    title: str = "",
+) -> Iterator[None]:
+    """Write a page like `write_page`, but replace its file after the block, or not at all if the block fails."""
     content = replace(content, panels=(*panels, *content.panels))
     made = page(file, other, title=title, view=view, content=content)
-    documents.write_bytes([np.frombuffer(made, np.uint8)], path)
+    if path == documents.PIPE:
+        documents.write_bytes([np.frombuffer(made, np.uint8)], path)
+        yield
+    else:
+        with documents.commit_text_after(made, path):
+            yield
     reporter.info(f"{path}  {format_bytes(len(made))}")

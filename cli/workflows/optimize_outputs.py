@@ -100,9 +100,15 @@ def _check_report(report: str, input: str, output: str) -> None:
         raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
 
-def write_comparison(html: str, input: str, about: optimize_report.OptimizeReport, reporter: Reporter) -> None:
-    """Write the page that compares the model before and after."""
-    from cli.io.page_output import page_file, write_page
+@contextmanager
+def write_comparison(
+    about: optimize_report.OptimizeReport, reporter: Reporter, html: str | None, input: str, *, dry_run: bool
+) -> Iterator[None]:
+    """Write the page that compares the model before and after around the block that writes the model."""
+    if html is None or dry_run:
+        yield
+        return
+    from cli.io.page_output import commit_page_after, page_file
     from cli.reports.page_panels import size_panels
     from cli.workflows.page_comparison import compare_files, worst_view
 
@@ -110,4 +116,5 @@ def write_comparison(html: str, input: str, about: optimize_report.OptimizeRepor
     after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
     content = compare_files(before, after, reporter)
     view = worst_view(before, content)
-    write_page(html, before, after, reporter, content=content, panels=size_panels(about), view=view)
+    with commit_page_after(html, before, after, reporter, content=content, panels=size_panels(about), view=view):
+        yield

@@ -19,7 +19,7 @@ from cli.errors import UsageError
 from cli.io import documents, scenes
 from cli.text import Reporter
 from cli.workflows.edit_clips import note_images
-from cli.workflows.simulation_report import check_report, write_report
+from cli.workflows.simulation_report import check_report, commit_report_after, write_report
 
 NO_CLIP = Clip("", ())
 Simulate = Callable[[Document, Scene, Clip, int | None], tuple[Document | bytes, SimulationReport, str]]
@@ -40,7 +40,8 @@ def simulate_clip(
 
     clip: glob of the driving clip; the first clip without it. simulate: gets the document, its scene, the driving clip,
     without tracks where the file has none, and its index; returns the document, or the bytes of a file of another
-    format, the report, and a summary. The report of an UnstableError is written too, before it is raised again.
+    format, the report, and a summary. The file and the report are both written, or neither. The report of an
+    UnstableError is written too, before it is raised again.
     others: extensions of other formats.
     """
     began = time.perf_counter()
@@ -58,17 +59,15 @@ def simulate_clip(
             if report is not None and error.report is not None and not dry_run:
                 write_report(error.report, report)
             raise
-        if isinstance(result, bytes):
-            size = len(result)
-            if not dry_run:
-                documents.write_bytes([np.frombuffer(result, np.uint8)], output)
-        else:
-            size = documents.write(result, output, source, dry_run=dry_run, reporter=reporter)
-    if not dry_run:
-        if not isinstance(result, bytes):
-            note_images(result, source, output, reporter)
-        if report is not None:
-            write_report(found, report)
+        with commit_report_after(found, None if dry_run else report):
+            if isinstance(result, bytes):
+                size = len(result)
+                if not dry_run:
+                    documents.write_bytes([np.frombuffer(result, np.uint8)], output)
+            else:
+                size = documents.write(result, output, source, dry_run=dry_run, reporter=reporter)
+    if not dry_run and not isinstance(result, bytes):
+        note_images(result, source, output, reporter)
     name = source.name if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     nothing = " (dry run: nothing written)" if dry_run else ""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import PurePath
-
-import numpy as np
 
 from anim.show.plots.figure import FORMATS
 from anim.show.plots.simulation_plot import simulation_plot
@@ -28,8 +28,22 @@ def check_report(path: str | None) -> str:
 
 def write_report(report: SimulationReport, path: str) -> None:
     """Write a report as JSON, or as its picture, in the format of the path's extension."""
+    documents.write_text(_render(report, path), path)
+
+
+@contextmanager
+def commit_report_after(report: SimulationReport, path: str | None) -> Iterator[None]:
+    """Write a report around the block that writes the output: if one of them fails, neither file changes."""
+    if path is None:
+        yield
+        return
+    with documents.commit_text_after(_render(report, path), path):
+        yield
+
+
+def _render(report: SimulationReport, path: str) -> str | bytes:
+    """The content of the file. Raises FormatError for numbers without JSON, UnsupportedError without matplotlib."""
     kind = PurePath(path).suffix.lower()[1:]
     if kind == "json":
-        documents.write_text(json_report.dump(report.to_json(), indent=2), path)
-        return
-    documents.write_bytes([np.frombuffer(simulation_plot(report, kind=kind), np.uint8)], path)
+        return json_report.dump(report.to_json(), indent=2)
+    return simulation_plot(report, kind=kind)

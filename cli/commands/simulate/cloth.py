@@ -37,7 +37,7 @@ from cli.text import Reporter
 from cli.workflows.bake_clip import Output, keeps_materials, onto_source
 from cli.workflows.colliders import parse_colliders
 from cli.workflows.simulate_clip import NO_CLIP, driving_clip
-from cli.workflows.simulation_report import check_report, write_report
+from cli.workflows.simulation_report import check_report, commit_report_after, write_report
 
 Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
 XPBD, MASS_SPRING = Solver("xpbd"), Solver("mass-spring")
@@ -194,11 +194,10 @@ def command(
         cache, given["source"] = onto_source(
             _as_part(cache, scene, node), source, number, output=Output(output, ending, dry_run)
         )
-    saved = cache_files.save(
-        cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
-    )
-    if report is not None and not dry_run:
-        write_report(run.report, report)
+    with commit_report_after(run.report, None if dry_run else report):
+        saved = cache_files.save(
+            cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
+        )
     saved.report(reporter)
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)

@@ -1,0 +1,112 @@
+"""A report that can't be made leaves the other files of its command as they were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from anim.errors import FormatError
+from tests.cli.conftest import Call, Fixture
+
+KINDS = [
+    ("particles", "biped", ("--node", "head", "--duration", "0.1")),
+    ("springs", "springs", ()),
+    ("cloth", "flag", ("--mesh", "flag", "--pin", "x-min", "--duration", "0.1")),
+    ("rigid", "wall", ("--body", "*", "--duration", "0.1")),
+]
+BVH = (
+    "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+    "End Site\n{\nOFFSET 0 1 0\n}\n}\nMOTION\nFrames: 2\nFrame Time: 0.1\n0 0 0\n9 0 0\n"
+)
+
+
+@pytest.fixture(params=["infinity", "disk"])
+def no_report(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every JSON report holds infinity, or no text can be stored."""
+
+    def fail(*_args: object, **_options: object) -> str:
+        raise FormatError("energy_j.start is inf: no report of it is possible")
+
+    name = "cli.reports.json_report.dump" if request.param == "infinity" else "cli.io.documents.commit_text_after"
+    monkeypatch.setattr(name, fail)
+
+
+@pytest.mark.usefixtures("no_report")
+@pytest.mark.parametrize(("kind", "name", "options"), KINDS, ids=[kind for kind, _, _ in KINDS])
+def test_a_simulation_without_its_report_writes_nothing(
+    kind: str, name: str, options: tuple[str, ...], fixture: Fixture, call: Call, tmp_path: Path
+) -> None:
+    if kind == "rigid":
+        pytest.importorskip("rapier3d")
+    out, report = tmp_path / "keep.glb", tmp_path / "report.json"
+    out.write_bytes(b"precious")
+    report.write_bytes(b"old")
+    run = call("simulate", kind, fixture(name), out, *options, "--report", report)
+    assert (run.code, run.err.count("no report of it is possible")) == (3, 1), run.err
+    assert (out.read_bytes(), report.read_bytes()) == (b"precious", b"old")
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_simulation_that_cannot_be_written_leaves_its_report(
+    fixture: Fixture, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_args: object, **_options: object) -> int:
+        raise FormatError("no")
+
+    monkeypatch.setattr("cli.io.documents.write", fail)
+    report = tmp_path / "report.json"
+    report.write_bytes(b"old")
+    args = (fixture("biped"), tmp_path / "out.glb", "--node", "head", "--duration", "0.1", "--report", report)
+    assert call("simulate", "particles", *args).code == 3
+    assert report.read_bytes() == b"old"
+
+
+def test_masses_whose_energies_overflow_are_refused(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    out = tmp_path / "keep.glb"
+    out.write_bytes(b"precious")
+    args = (fixture("biped"), out, "--node", "head", "--mass", "1e308", "--duration", "0.1")
+    run = call("simulate", "particles", *args, "--report", tmp_path / "q.json")
+    assert (run.code, out.read_bytes()) == (2, b"precious")
+    assert run.err == "gltf-anim: --mass is 1e+308 kg (expected above 0, at most 1e+12)\n"
+
+
+def _fail(*_args: object, **_options: object) -> str:
+    raise FormatError("no report of it is possible")
+
+
+def test_motion_without_its_json_report_replaces_nothing(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    out = tmp_path / "keep.glb"
+    out.write_bytes(b"precious")
+    monkeypatch.setattr("cli.reports.from_euler_report.as_json", _fail)
+    run = call("from-euler", tmp_path / "a.bvh", out, "--format", "json")
+    assert (run.code, run.out, out.read_bytes()) == (3, b"", b"precious"), run.err
+
+
+@pytest.mark.parametrize("command", ["collapse", "diff"])
+def test_a_plot_without_its_json_report_replaces_nothing(
+    command: str, fixture: Fixture, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    plot = tmp_path / "keep.svg"
+    plot.write_bytes(b"precious")
+    monkeypatch.setattr(f"cli.reports.{command}_report.as_json", _fail)
+    path = fixture("arm")
+    inputs = (path,) if command == "collapse" else (path, path)
+    run = call(command, *inputs, "--plot", plot, "--format", "json")
+    assert (run.code, run.out, plot.read_bytes()) == (3, b"", b"precious"), run.err
+
+
+def test_a_model_without_its_page_is_not_replaced(
+    fixture: Fixture, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cli.io.page_output.check_page", lambda *_args: None)  # also without the page's script
+    monkeypatch.setattr("cli.io.page_output.page", _fail)
+    out, html = tmp_path / "keep.glb", tmp_path / "keep.html"
+    for path in (out, html):
+        path.write_bytes(b"precious")
+    run = call("optimize", fixture("noop"), out, "--html", html)
+    assert (run.code, out.read_bytes(), html.read_bytes()) == (3, b"precious", b"precious"), run.err
