@@ -26,6 +26,7 @@ STDOUT = 1  # its descriptor
 DEPFILE = "gltf_anim.depfile"  # key of the context
 MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
 METAVARS = {str: "TEXT", int: "N", float: "N"}
+MAX_INTEGER = 1e18  # of arrays' 64 bits; no count is as large
 LISTINGS = {"EASINGS": "gltf-anim ease --list", "TANGENTS": "gltf-anim spline --list"}  # by the library's table
 
 
@@ -226,6 +227,8 @@ def _number(value: Any, kind: type, low: float | None, high: float | None) -> fl
         number: float = kind(value)
     except ValueError:
         raise typer.BadParameter(f"'{value}' is no {'whole number' if kind is int else 'number'}") from None
+    if kind is int and abs(number) > MAX_INTEGER:
+        raise typer.BadParameter(f"{value} is too large (expected at most {MAX_INTEGER:g})")
     if not math.isfinite(number):
         raise typer.BadParameter(f"'{value}' is no finite number")
     if low is not None and number < low:

@@ -15,6 +15,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError, UnsupportedError, check_number
 from anim.memory import MemoryBudget
 from anim.sampling.times import check_duration, check_fps, frame_times
+from anim.simulation.limits import check_range
 
 MAX_STEPS = 10_000_000
 FEWER_STEPS = "choose a shorter `duration`, or a longer `step`"
@@ -67,6 +68,19 @@ class Steps:
     def frames(self, fps: float) -> Floats:
         """Return the frame times (F,) s from 0 to the duration."""
         return frame_times(0.0, self.duration_s, fps=fps)
+
+
+def count_substeps(fps: float, step: float) -> int:
+    """Return the fewest equal steps of at most `step` s that a frame of `fps` per second has.
+
+    Raises RangeError unless both are above 0, UnsupportedError for over ten million.
+    count_substeps(60, 1 / 240) → 4
+    """
+    check_fps(fps)
+    check_range("step", step, 0.0, math.inf, "s", is_above=True)
+    if not fps * step * MAX_STEPS >= 1:
+        raise UnsupportedError(f"more than {MAX_STEPS} steps of {step:g} s in a frame", help="choose a longer `step`")
+    return max(1, _count(1 / (fps * step)))
 
 
 def _count(steps: float) -> int:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from fractions import Fraction
 from typing import Annotated
 
 import typer
 
+from anim.errors import RangeError
 from anim.simulation.integrators import INTEGRATORS
 from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
 from cli.errors import UsageError
@@ -104,6 +107,16 @@ def check_fps(fps: float) -> None:
     """Raise UsageError unless `fps` is above 0."""
     if fps <= 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
+
+
+@contextmanager
+def name_option(option: str, given: str) -> Iterator[None]:
+    """Raise UsageError with the option and what was given for values of it that are out of range."""
+    try:
+        yield
+    except RangeError as error:
+        problem = error.problem.replace("`", "")  # parameters of the part, not the command's options
+        raise UsageError(f"{option} is '{given}': {problem}", help=error.help) from None
 
 
 def parse_vector(given: str, option: str) -> tuple[float, float, float]:

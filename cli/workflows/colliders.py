@@ -12,7 +12,7 @@ from anim.simulation.spring_bones.json_reader import read_spring_file
 from anim.simulation.spring_bones.read import read_colliders
 from cli.errors import UsageError
 from cli.io import documents
-from cli.options.simulation import parse_numbers, parse_vector
+from cli.options.simulation import name_option, parse_numbers, parse_vector
 
 VRM = "vrm"
 ORIGIN = (0.0, 0.0, 0.0)
@@ -29,9 +29,15 @@ def parse_colliders(
     files: Sequence[str],
 ) -> tuple[Obstacle, ...]:
     """Return all colliders that the options name. files: "vrm" or names of JSON files."""
-    found: list[Obstacle] = [_sphere(each, scene) for each in spheres]
-    found += [_capsule(each, scene) for each in capsules]
-    found += [_plane(each, scene) for each in planes]
+    found: list[Obstacle] = []
+    for option, parse, texts in (
+        ("--sphere", _sphere, spheres),
+        ("--capsule", _capsule, capsules),
+        ("--plane", _plane, planes),
+    ):
+        for each in texts:
+            with name_option(option, each):
+                found.append(parse(each, scene))
     for each in files:
         found += _of_file(each, document, scene)
     return tuple(found)

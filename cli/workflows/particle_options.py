@@ -11,12 +11,18 @@ from anim.simulation.particles.attractors import Attractor
 from anim.simulation.particles.obstacles import Box
 from cli import units
 from cli.errors import UsageError
+from cli.options.simulation import name_option
 
 ATTRACTOR_RADIUS = "10%"
 
 
 def parse_box(given: str, scene: Scene) -> Box:
     """Return the box of "NODE,SX,SY,SZ" or "X,Y,Z,SX,SY,SZ"."""
+    with name_option("--box", given):
+        return _box(given, scene)
+
+
+def _box(given: str, scene: Scene) -> Box:
     parts = given.split(",")
     numbers = [_as_number(each) for each in parts]
     if len(parts) == 6 and None not in numbers:
@@ -37,7 +43,9 @@ def parse_attractor(given: str, scene: Scene) -> Attractor:
     if strength is None or not name:
         raise UsageError(f"--attractor is '{given}' (expected NODE:STRENGTH or NODE:STRENGTH:RADIUS)")
     radius = units.parse_length(parts[-1] if has_radius else ATTRACTOR_RADIUS, "--attractor", lambda: diagonal(scene))
-    return Attractor(strength, radius, _node(name, "--attractor", scene))
+    node = _node(name, "--attractor", scene)
+    with name_option("--attractor", given):
+        return Attractor(strength, radius, node)
 
 
 def _as_number(given: str) -> float | None:

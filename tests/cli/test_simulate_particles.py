@@ -239,7 +239,7 @@ def test_threads_change_no_byte(fixture: Fixture, call: Call, tmp_path: Path, mo
         (("--attractor", "head:3:0m"), 2, "--attractor is '0m'"),
         (("--sphere", "head"), 2, "expected NODE,R or X,Y,Z,R"),
         (("--sphere", "*,1"), 2, "names"),
-        (("--box", "head,1,0,1"), 2, "size of a box"),
+        (("--box", "head,1,0,1"), 2, "--box is 'head,1,0,1': size is 0 m"),
         (("--max-error", "0mm"), 2, "--max-error"),
         (("--duration", "0"), 2, "--duration is 0"),
         (("--as", "sprite"), 2, "sprite"),

@@ -9,6 +9,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
+from anim.simulation.limits import MAX_LENGTH_M, check_largest, check_range
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape, Vector
 from anim.simulation.spring_bones.collisions import cofactors
 
@@ -19,7 +20,7 @@ OUTSIDE, INSIDE, PLANE = 1.0, -1.0, 0.0  # as in kernels/collisions.py, which is
 class Capsule:
     """Collider between two points, each (3,) m in the space of a node, or of the scene for None; a ball if equal.
 
-    inside: points stay inside of it. Raises RangeError for a radius that isn't above 0.
+    inside: points stay inside of it. Raises RangeError for a radius that isn't above 0, or above MAX_LENGTH_M.
     """
 
     start: Vector
@@ -30,8 +31,9 @@ class Capsule:
     inside: bool = False
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.radius) and self.radius > 0):
-            raise RangeError(f"the radius of a collider is {self.radius:g} m (expected above 0)")
+        check_range("radius", self.radius, 0.0, MAX_LENGTH_M, "m", is_above=True)
+        for point in (self.start, self.end):
+            check_largest("center", point, MAX_LENGTH_M, "m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class Plane:
     node: int | None = None
 
     def __post_init__(self) -> None:
+        check_largest("point", self.point, MAX_LENGTH_M, "m")
         length = float(np.linalg.norm(self.normal))
         if not (np.isfinite(length) and length > 0):
             raise RangeError(f"the normal of a plane is {self.normal} (expected a direction)")

@@ -7,10 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.errors import NotFoundError, RangeError
+from anim.errors import NotFoundError
 from anim.simulation.cloth.hierarchy import Hierarchy, build_hierarchy
 from anim.simulation.cloth.tethers import order_outward, tether_lengths
 from anim.simulation.cloth.topology import ClothTopology, build_topology
+from anim.simulation.limits import (
+    MAX_COEFFICIENT,
+    MAX_COMPLIANCE_M_N,
+    MAX_DENSITY,
+    MAX_LENGTH_M,
+    MAX_RATE_PER_S,
+    check_range,
+)
 
 WELD_PER_DIAGONAL = 1e-6  # vertices closer than this fraction of the diagonal are one point
 SELF_COLLISION_PER_EDGE = 0.9  # thickness, of the shortest edge
@@ -32,11 +40,12 @@ class Fabric:
     friction: float = 0.3
 
     def __post_init__(self) -> None:
-        for name in ("density", "stretch_compliance", "bend_compliance", "damping", "thickness", "friction"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0) or (name == "density" and value == 0):
-                limit = "above 0" if name == "density" else "at least 0"
-                raise RangeError(f"`{name}` is {value:g} (expected {limit})")
+        check_range("density", self.density, 0.0, MAX_DENSITY, "kg/m²", is_above=True)
+        check_range("stretch_compliance", self.stretch_compliance, 0.0, MAX_COMPLIANCE_M_N, "m/N")
+        check_range("bend_compliance", self.bend_compliance, 0.0, MAX_COMPLIANCE_M_N, "m/N")
+        check_range("damping", self.damping, 0.0, MAX_RATE_PER_S, "per second")
+        check_range("thickness", self.thickness, 0.0, MAX_LENGTH_M, "m")
+        check_range("friction", self.friction, 0.0, MAX_COEFFICIENT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

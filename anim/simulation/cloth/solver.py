@@ -13,6 +13,15 @@ from anim.simulation.cloth.divergence import check_lengths, check_motion, longes
 from anim.simulation.cloth.driver import ClothDriver
 from anim.simulation.cloth.elongation import ElongationRecord
 from anim.simulation.cloth.model import ClothModel, Fabric
+from anim.simulation.limits import (
+    MAX_ACCELERATION_M_S2,
+    MAX_COEFFICIENT,
+    MAX_DENSITY,
+    MAX_LENGTH_M,
+    MAX_SPEED_M_S,
+    check_largest,
+    check_range,
+)
 
 NO_FLOOR_M = -1e30
 AIR_KG_M3 = 1.2
@@ -29,7 +38,7 @@ PEAK_LOAD = 4.0  # largest tension, of the weight: 3 at the bottom of a swing fr
 class Environment:
     """Forces on a cloth: gravity (3,) m/s², wind (3,) m/s, gusts as a fraction of its speed, floor m or None.
 
-    air: kg/m³. seed: of the gusts. period: s, after which they repeat; None for no period.
+    air: kg/m³. seed: of the gusts. period: s, after which they repeat; None for no period. Raises RangeError.
     """
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
@@ -39,6 +48,14 @@ class Environment:
     floor: float | None = None
     seed: int = 0
     period: float | None = None
+
+    def __post_init__(self) -> None:
+        check_largest("gravity", self.gravity, MAX_ACCELERATION_M_S2, "m/s²")
+        check_largest("wind", self.wind, MAX_SPEED_M_S, "m/s")
+        check_range("gusts", self.gusts, 0.0, MAX_COEFFICIENT)
+        check_range("air", self.air, 0.0, MAX_DENSITY, "kg/m³")
+        if self.floor is not None:
+            check_largest("floor", (self.floor,), MAX_LENGTH_M, "m")
 
     def wind_at(self, times: Floats) -> Floats:
         """Return the wind (S, 3) m/s at times (S,) s: its mean, and sines in all directions as gusts."""

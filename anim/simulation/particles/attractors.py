@@ -6,7 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.errors import RangeError
+from anim.simulation.limits import (
+    MAX_ACCELERATION_M_S2,
+    MAX_LENGTH_M,
+    MIN_RADIUS_M,
+    check_largest,
+    check_range,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,10 +29,9 @@ class Attractor:
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.radius) and self.radius > 0):
-            raise RangeError(f"the radius of an attractor is {self.radius:g} m (expected above 0)")
-        if not np.isfinite(self.strength):
-            raise RangeError(f"the strength of an attractor is {self.strength:g} m/s² (expected a finite number)")
+        check_range("radius", self.radius, MIN_RADIUS_M, MAX_LENGTH_M, "m")
+        check_range("strength", self.strength, -MAX_ACCELERATION_M_S2, MAX_ACCELERATION_M_S2, "m/s²")
+        check_largest("center", self.center, MAX_LENGTH_M, "m")
 
     @property
     def max_frequency(self) -> float:

@@ -11,6 +11,15 @@ import numpy as np
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
+from anim.simulation.limits import (
+    MAX_ACCELERATION_M_S2,
+    MAX_LENGTH_M,
+    MAX_RATE_PER_S,
+    MAX_SPEED_M_S,
+    MIN_RADIUS_M,
+    check_largest,
+    check_range,
+)
 from anim.simulation.particles.attractors import Attractor
 from anim.simulation.particles.node_motion import split_frames
 from anim.simulation.particles.obstacles import Drive
@@ -20,8 +29,6 @@ if TYPE_CHECKING:
 
 NUM_MODES = 24  # of the turbulence; more are not seen
 EARTH_GRAVITY_M_S2 = (0.0, -9.81, 0.0)
-
-MAX_ACCELERATION_M_S2, MAX_AIR_SPEED_M_S, MAX_DRAG = 1e4, 1e4, 1e6  # beyond, a number is a mistake
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,21 +50,12 @@ class Forces:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("linear_drag", "quadratic_drag", "turbulence", "turbulence_size"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0) or (name == "turbulence_size" and value == 0):
-                raise RangeError(f"`{name}` is {value:g} (expected a number of at least 0)")
-        for name, most, unit in (
-            ("gravity", MAX_ACCELERATION_M_S2, " m/s²"),
-            ("wind", MAX_AIR_SPEED_M_S, " m/s"),
-            ("turbulence", MAX_AIR_SPEED_M_S, " m/s"),
-            ("linear_drag", MAX_DRAG, ""),
-            ("quadratic_drag", MAX_DRAG, ""),
-        ):
-            largest = float(np.abs(getattr(self, name)).max())
-            if largest > most:
-                option = name.removeprefix("linear_")
-                raise RangeError(f"`{option}` is {largest:g}{unit} (limit {most:g})")
+        check_largest("gravity", self.gravity, MAX_ACCELERATION_M_S2, "m/s²")
+        check_largest("wind", self.wind, MAX_SPEED_M_S, "m/s")
+        check_range("turbulence", self.turbulence, 0.0, MAX_SPEED_M_S, "m/s")
+        check_range("turbulence_size", self.turbulence_size, MIN_RADIUS_M, MAX_LENGTH_M, "m")
+        check_range("drag", self.linear_drag, 0.0, MAX_RATE_PER_S, "per second")
+        check_range("quadratic_drag", self.quadratic_drag, 0.0, MAX_RATE_PER_S, "per metre")
         if (any(self.wind) or self.turbulence) and not (self.linear_drag or self.quadratic_drag):
             raise RangeError(
                 "`wind` and `turbulence` act by drag, and drag is 0", help="give a drag, such as 1 per second"

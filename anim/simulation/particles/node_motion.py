@@ -11,7 +11,7 @@ from anim.maths import matrix, quaternion
 from anim.model import Clip, Skeleton
 from anim.sampling import PoseSampler, world_matrices
 
-CHUNK_STEPS = 256  # poses of all nodes are in memory for this many
+CHUNK_STEPS, CHUNK_MATRICES = 256, 1 << 18  # poses of all nodes are in memory for this many, or fewer of many nodes
 
 
 class NodeMotion:
@@ -26,8 +26,9 @@ class NodeMotion:
         """Return the world matrices (S, n, 3, 4) at times (S,) s."""
         matrices = np.empty((len(times), len(nodes), 3, 4))
         wrapped = np.maximum(times, 0.0) if self._period is None else _wrap(times, self._period)
-        for first in range(0, len(times), CHUNK_STEPS):
-            chunk = slice(first, first + CHUNK_STEPS)
+        num_steps = min(CHUNK_STEPS, max(1, CHUNK_MATRICES // max(len(self._skeleton), 1)))
+        for first in range(0, len(times), num_steps):
+            chunk = slice(first, first + num_steps)
             poses = self._sampler.at(self._start + wrapped[chunk])
             matrices[chunk] = world_matrices(self._skeleton, poses)[:, list(nodes)]
         return matrices

@@ -12,6 +12,7 @@ from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
 from anim.simulation.cloth.colliders import Capsule, Plane, place_obstacles
+from anim.simulation.limits import MAX_LENGTH_M, check_largest, check_range
 from anim.simulation.particles.node_motion import split_frames
 from anim.simulation.spring_bones.colliders import Vector
 
@@ -27,9 +28,12 @@ PLANE_BALL_M = 1000.0  # radius around a plane's point, for bounds of its motion
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Half-space below y = height m."""
+    """Half-space below y = height m. Raises RangeError."""
 
     height: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_largest("floor", (self.height,), MAX_LENGTH_M, "m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +48,8 @@ class Sphere:
     node: int | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.radius) and self.radius > 0):
-            raise RangeError(f"the radius of a sphere is {self.radius:g} m (expected above 0)")
+        check_range("radius", self.radius, 0.0, MAX_LENGTH_M, "m", is_above=True)
+        check_largest("center", self.center, MAX_LENGTH_M, "m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +64,9 @@ class Box:
     node: int | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.size).all() and min(self.size) > 0):
-            raise RangeError(f"the size of a box is {self.size} m (expected three numbers above 0)")
+        for size in self.size:
+            check_range("size", size, 0.0, MAX_LENGTH_M, "m", is_above=True)
+        check_largest("center", self.center, MAX_LENGTH_M, "m")
 
 
 Obstacle: TypeAlias = Floor | Sphere | Box | Capsule | Plane

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import DataRangeError, RangeError, UnstableError
+from anim.errors import DataRangeError, RangeError, UnstableError, UnsupportedError
 from anim.gltf.document import Document
 from anim.model import Clip, Scene
 from anim.model.point_cache import PointCache
 from anim.simulation.particles import gltf_output, tracks
-from anim.simulation.particles.emission import Births, Emitter, emit, repeat_births
+from anim.simulation.particles.emission import Births, Emitter, place_births, plan_births, repeat_births
 from anim.simulation.particles.key_paths import evaluate_keys, largest_distance, sample_points
 from anim.simulation.particles.node_motion import NodeMotion
 from anim.simulation.particles.options import ParticleOptions
@@ -20,7 +20,7 @@ from anim.simulation.particles.reduction import reduce_keys
 from anim.simulation.particles.report import make_failed_report, make_report
 from anim.simulation.particles.solver import DivergedError, ParticleKeys, ParticleSolver
 from anim.simulation.report import SimulationReport
-from anim.simulation.steps import Steps
+from anim.simulation.steps import Steps, count_substeps
 
 __all__ = ["ParticleOptions", "ParticleRun", "add_particles", "simulate_particles"]
 
@@ -48,15 +48,19 @@ class ParticleRun:
 def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: ParticleOptions) -> ParticleRun:
     """Return the paths of all particles.
 
-    Raises UnstableError with a report, or RangeError for a run without particles.
+    Raises UnstableError with a report, RangeError for a run without particles, and UnsupportedError, before any work,
+    for more at a time than `max_nodes`.
     """
-    substeps = max(1, int(np.ceil(1 / (options.fps * options.step) - 1e-9)))
+    substeps = count_substeps(options.fps, options.step)
     step = 1 / (options.fps * substeps)
     start = 0.0 if options.loop else -options.warm_up
-    births = emit(scene, clip, emitter, start, options.duration, options.seed, options.start)
+    plan = plan_births(emitter, start, options.duration, options.seed)
+    if options.max_nodes is not None:
+        check_simultaneous(plan.count_simultaneous(options.duration, is_loop=options.loop), options.max_nodes)
+    births = place_births(scene, clip, emitter, plan, options.start)
     if not len(births):
         raise RangeError(
-            f"no particle is emitted in {options.duration:g} s", help="raise the rate, the burst or the duration"
+            f"no particle is emitted in {options.duration:g} s", help="raise `rate`, `burst` or `duration`"
         )
     _check_speed(births)
     num_emitted = len(births)
@@ -91,6 +95,12 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
         reduction=reduction,
     )
     return ParticleRun(nodes, keys, births, options, report)
+
+
+def check_simultaneous(count: int, max_nodes: int) -> None:
+    """Raise UnsupportedError for more particles at a time than nodes that may be written."""
+    if count > max_nodes:
+        raise UnsupportedError(f"{count} particles at a time (limit {max_nodes} nodes)")
 
 
 def _check_speed(births: Births) -> None:

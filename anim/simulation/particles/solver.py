@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.errors import RangeError, UnstableError
+from anim.errors import UnstableError
 from anim.memory import MemoryBudget
 from anim.simulation.integrators import find_integrator
+from anim.simulation.limits import MAX_COEFFICIENT, check_range
 from anim.simulation.particles.attractors import Attractor
 from anim.simulation.particles.emission import Births
 from anim.simulation.particles.forces import Forces, pack_forces
@@ -32,10 +33,8 @@ class Contact:
     friction: float = 0.3
 
     def __post_init__(self) -> None:
-        if not 0 <= self.restitution <= 1:
-            raise RangeError(f"`restitution` is {self.restitution:g} (expected 0 to 1)")
-        if not (np.isfinite(self.friction) and self.friction >= 0):
-            raise RangeError(f"`friction` is {self.friction:g} (expected a number of at least 0)")
+        check_range("restitution", self.restitution, 0.0, 1.0)
+        check_range("friction", self.friction, 0.0, MAX_COEFFICIENT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -34,19 +34,21 @@ def split_paths(keys: ParticleKeys, start: float = 0.0) -> list[ParticlePath]:
     Of keys that fall together in float32 the first keeps its place, with the last one's velocity after it.
     """
     starts = np.flatnonzero(np.diff(keys.particles, prepend=-1))
+    times = start + keys.times
+    stored = times.astype(np.float32)
+    rounded = stored.astype(np.float64)
+    falls = np.cumsum(np.append(0, np.diff(stored) <= 0))  # up to each key
     paths = []
-    for first, last in zip(starts, [*starts[1:], len(keys.times)], strict=True):
-        times = start + keys.times[first:last]
-        kept = distinct_float32(times)
-        if len(kept) < 2:
-            continue
-        ends = np.append(kept[1:], len(times)) - 1
-        rounded = times[kept].astype(np.float32).astype(np.float64)
-        rows = first + kept
-        paths.append(
-            ParticlePath(rounded, keys.positions[rows], keys.in_velocities[rows], keys.out_velocities[first + ends])
-        )
-    return sorted(paths, key=lambda path: path.times[0])
+    for first, last in zip(starts.tolist(), [*starts[1:].tolist(), len(times)], strict=True):
+        rows: slice | Ints = slice(first, last)  # no array: copies of 100 000 short paths would be most of the time
+        ends = rows
+        if falls[last - 1] > falls[first]:
+            kept = first + distinct_float32(times[first:last])
+            rows, ends = kept, np.append(kept[1:], last) - 1
+        path = ParticlePath(rounded[rows], keys.positions[rows], keys.in_velocities[rows], keys.out_velocities[ends])
+        if len(path.times) >= 2:
+            paths.append(path)
+    return sorted(paths, key=lambda path: float(path.times[0]))
 
 
 def share_nodes(paths: Sequence[ParticlePath]) -> list[list[ParticlePath]]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from anim.errors import RangeError
-from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2, MAX_ACCELERATION_M_S2
+from anim.simulation.limits import MAX_ACCELERATION_M_S2, check_largest
+from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
 from anim.simulation.rigid_bodies.description import Vector
 
 SETTLED_M = 1e-4  # largest distance of a body between both ends of a round that counts as none
@@ -31,5 +30,4 @@ class RigidOptions:
     estimate_error: bool = False
 
     def __post_init__(self) -> None:
-        if not math.hypot(*self.gravity) <= MAX_ACCELERATION_M_S2:
-            raise RangeError(f"`gravity` is {list(self.gravity)} m/s² (limit {MAX_ACCELERATION_M_S2:g})")
+        check_largest("gravity", self.gravity, MAX_ACCELERATION_M_S2, "m/s²")

@@ -29,7 +29,7 @@ from anim.simulation.rigid_bodies.options import RigidOptions
 from anim.simulation.rigid_bodies.overlaps import check_overlaps
 from anim.simulation.rigid_bodies.report import make_report
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
-from anim.simulation.steps import Steps
+from anim.simulation.steps import Steps, count_substeps
 
 STEP_BYTES, FRAME_BYTES = 200, 300  # of a body at each step and frame, while they become keys
 MAX_ROUNDS = 20  # of the clip, until bodies repeat their motion
@@ -59,7 +59,7 @@ def simulate_rigid_bodies(scene: Scene, clip: Clip, description: PhysicsDescript
     """
     skeleton, start = scene.skeleton, clip.start
     clip = Clip(clip.name, tuple(shift_time(track, -start) for track in clip.tracks))
-    substeps = max(1, int(np.ceil(1 / (options.fps * options.step) - 1e-9)))
+    substeps = count_substeps(options.fps, options.step)
     steps = Steps(1 / (options.fps * substeps), options.duration, options.warm_up)
     world = world_matrices(skeleton, sample_pose(skeleton, clip, np.zeros(1)))[0]
     rigid = assemble(description, skeleton, clip, world, options.gravity)

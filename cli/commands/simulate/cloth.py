@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -26,6 +25,7 @@ from anim.simulation.cloth.simulate import ClothRun, simulate_cloth
 from anim.simulation.cloth.solver import Environment
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import describe_elongation
+from anim.simulation.steps import count_substeps
 from anim.units import format_number, plural
 from cli import text, units
 from cli.errors import CheckError, UsageError
@@ -133,7 +133,7 @@ def command(
     ending = cache_files.check(output, None if format is None else f".{format}")
     given: dict[str, Any] = {"quantize": quantize, "layout": layout, "max_targets": max_targets}
     writing = caches.write_options(ending, given | {"max_error": max_error})
-    substeps = max(1, math.ceil(1 / (fps * parse_seconds(step, "--step")) - 1e-9))
+    substeps = count_substeps(fps, parse_seconds(step, "--step"))
     limit = None if max_stretch is None else units.parse_fraction(max_stretch, "--max-stretch")
     with documents.source(input, reporter) as source:
         document = source.document

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import PurePath
@@ -19,14 +18,15 @@ from anim.operations.selection import Selection
 from anim.simulation.particles.emission import Emitter
 from anim.simulation.particles.forces import Forces
 from anim.simulation.particles.obstacles import Floor, Obstacle
-from anim.simulation.particles.options import SPARK_KG, ParticleOptions
+from anim.simulation.particles.options import MAX_SIZE_M, MIN_SIZE_M, SPARK_KG, ParticleOptions
 from anim.simulation.particles.rigid_colliders import read_rigid_colliders
-from anim.simulation.particles.simulate import ParticleRun, add_particles, simulate_particles
+from anim.simulation.particles.simulate import add_particles, check_simultaneous, simulate_particles
 from anim.simulation.particles.solver import Contact
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.units import is_zero_angle, plural
 from cli import text, units
+from cli.errors import UsageError
 from cli.options import common, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
@@ -222,15 +222,21 @@ def command(
                 *(_rigid_colliders(document, scene, reporter) if RIGID_BODIES in (colliders or ()) else ()),
             ),
             attractors=tuple(parse_attractor(each, scene) for each in attractor or ()),
+            max_nodes=None if force or ending in POINT_FORMATS else MAX_NODES,
             max_error=0.0
             if max_error is None
             else units.parse_length(max_error, "--max-error", lambda: diagonal(scene)),
         )
         announce_compiling(reporter)
-        run = simulate_particles(scene, driver, emitter, chosen)
+        try:
+            run = simulate_particles(scene, driver, emitter, chosen)
+            if chosen.max_nodes is not None:  # the exact count: a node rests between two particles
+                check_simultaneous(len(run.nodes), chosen.max_nodes)
+        except UnsupportedError as error:
+            raise error.advise("lower --rate, or --force, or OUT.npz") from None
         if ending in POINT_FORMATS:
             return encode_points(run.points(), fps, ending), run.report, _summary(run.report, has_nodes=False)
-        _check_nodes(run, form, reporter, force=force)
+        _note_many_nodes(len(run.nodes), form, reporter)
         merged = (number, driver) if merge and number is not None else None
         if number is not None and merged is None:
             note_own_clip(name, driver, reporter)
@@ -260,12 +266,18 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
 
 
 def _radius(size: str, scene: Scene) -> float:
-    """Radius of a particle in m. Raises DataRangeError for a model that has no size, or one beyond all numbers."""
+    """Radius of a particle in m.
+
+    Raises UsageError for one that no file can have, DataRangeError where that is the model's fault: without a size, or
+    beyond all numbers.
+    """
     radius = units.parse_length(size, "--size", lambda: diagonal(scene))
-    if not 0 < radius < math.inf:
-        problem = (
-            f"--size is {size} of the model, whose diagonal is {diagonal(scene):.3g} m (expected a radius above 0)"
-        )
+    is_relative = size.rstrip().endswith("%")
+    if not is_relative and not MIN_SIZE_M <= radius <= MAX_SIZE_M:
+        raise UsageError(f"--size is '{size}' (expected {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m)")
+    if not MIN_SIZE_M <= radius <= MAX_SIZE_M:
+        about = f"{size} of the model, whose diagonal is {diagonal(scene):.3g} m"
+        problem = f"--size is {about} (expected {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m)"
         raise DataRangeError(problem, help="choose --size, such as 2cm")
     return radius
 
@@ -280,12 +292,7 @@ def _rigid_colliders(document: Document, scene: Scene, reporter: Reporter) -> li
     return found
 
 
-def _check_nodes(run: ParticleRun, form: Form, reporter: Reporter, *, force: bool) -> None:
-    count = len(run.nodes)
-    if count > MAX_NODES and not force:
-        raise UnsupportedError(
-            f"{count} particles at a time (limit {MAX_NODES} nodes)", help="lower --rate, or --force, or OUT.npz"
-        )
+def _note_many_nodes(count: int, form: Form, reporter: Reporter) -> None:
     if count > MANY_NODES:
         reporter.warn(f"{count} nodes: players take about a second to bind their tracks")
     elif count > MANY_DRAWS and form is Form.NODE:

@@ -26,7 +26,7 @@ from anim.units import plural
 from cli import text, units
 from cli.errors import UsageError
 from cli.options import common, simulation
-from cli.options.simulation import parse_seconds, parse_vector
+from cli.options.simulation import name_option, parse_seconds, parse_vector
 from cli.text import Reporter
 from cli.workflows.simulate_clip import note_own_clip, simulate_clip
 
@@ -103,13 +103,9 @@ def command(
         if without_mesh:
             names = plural(len(without_mesh), "node")
             reporter.info(f"note: {names} of --body without a mesh of their own are no bodies")
-        chosen = ChosenNodes(
-            bodies,
-            shape.value,
-            _nodes(scene, collider),
-            Motion(density=density, follows_clip=False),
-            material,
-        )
+        with name_option("--density", f"{density:g}"):
+            motion = Motion(density=density, follows_clip=False)
+        chosen = ChosenNodes(bodies, shape.value, _nodes(scene, collider), motion, material)
         description = replace(add_chosen(description, scene, chosen), floor=floor, floor_material=material)
         description = _with_velocities(description, scene, velocity or [])
         seconds = duration if duration is not None else driver.end - driver.start or DEFAULT_DURATION_S
@@ -140,7 +136,8 @@ def _with_velocities(description: PhysicsDescription, scene: Scene, given: list[
         if not nodes:
             raise UsageError(f"--velocity '{glob}' names no body")
         for node in nodes:
-            motions[node] = replace(motions[node], linear_velocity=velocity, velocity_in_world=True)
+            with name_option("--velocity", each):
+                motions[node] = replace(motions[node], linear_velocity=velocity, velocity_in_world=True)
     return replace(description, motions=motions)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any
 
 import typer
 
 from anim.arrays import Floats
-from anim.errors import UnstableError
+from anim.errors import RangeError, UnstableError
 from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -137,6 +137,7 @@ def command(
     changes: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     if gravity is not None:
         changes["gravity"] = _gravity(gravity)
+    _check_parameters(changes)
 
     def simulate(
         document: Document, scene: Scene, driver: Clip, number: int | None
@@ -202,6 +203,16 @@ def _center(skeleton: Skeleton, glob: str | None) -> int | None:
     if len(found) > 1:
         raise UsageError(f"--center '{glob}' matches {len(found)} nodes (expected one)")
     return found[0]
+
+
+def _check_parameters(changes: Mapping[str, Any]) -> None:
+    """Raise UsageError, with the option's name, for a parameter out of range; those of files have their place there."""
+    for name, value in changes.items():
+        try:
+            SpringParameters(**{name: value})
+        except RangeError as error:
+            problem = error.problem.removeprefix(name.replace("_", " "))
+            raise UsageError(f"--{name.replace('_', '-')}{problem}") from None
 
 
 def _gravity(given: str) -> Vector:

@@ -7,7 +7,7 @@ import pytest
 
 from anim.errors import RangeError, UnsupportedError
 from anim.memory import memory_limit
-from anim.simulation.steps import Steps
+from anim.simulation.steps import Steps, count_substeps
 
 
 def test_steps_are_counted_by_integers() -> None:
@@ -32,3 +32,18 @@ def test_steps_and_frames_count_for_the_limit_of_memory() -> None:
             steps.check_memory("2 joints", step_bytes=6, fps=2.0, frame_bytes=20)
     with pytest.raises(RangeError, match="`fps` is 0"):
         steps.check_memory("2 joints", fps=0.0)
+
+
+@pytest.mark.parametrize(
+    ("fps", "step", "count"), [(60, 1 / 240, 4), (60, 1 / 60, 1), (60, 1 / 100, 2), (60, 5.0, 1), (1e308, 1e308, 1)]
+)
+def test_the_substeps_of_a_frame_are_the_fewest_that_are_short_enough(fps: float, step: float, count: int) -> None:
+    assert count_substeps(fps, step) == count
+
+
+@pytest.mark.parametrize(("fps", "step"), [(60, 1e-320), (1e-308, 1e-308), (60, 1e-9), (1e-300, 1.0)])
+def test_too_many_substeps_are_refused(fps: float, step: float) -> None:
+    with pytest.raises(UnsupportedError, match=r"more than 10000000 steps of .* s in a frame"):
+        count_substeps(fps, step)
+    with pytest.raises(RangeError):
+        count_substeps(fps, 0.0)
