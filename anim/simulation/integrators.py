@@ -16,9 +16,11 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.errors import RangeError
+from anim.simulation.limits import MAX_COEFFICIENT, check_range
 
 RADIUS_TOLERANCE = 1e-12
 MAX_OMEGA_H = 10.0  # up to which limits with damping are searched
+MIN_OMEGA, MAX_OMEGA = 1e-9, 1e9  # rad/s
 
 State: TypeAlias = tuple[Floats, Floats]
 Scalar: TypeAlias = Floats | float  # or (P, 1), another for each point
@@ -174,7 +176,7 @@ def find_integrator(name: str) -> Integrator:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DampedOscillator:
-    """System x″ = −omega² x − 2 ratio omega x′ of points (P, 3); omega: rad/s, also (P, 1), as the ratio."""
+    """System x″ = −omega² x − 2 ratio omega x′ of points (P, 3) of 1 kg; omega: rad/s, also (P, 1), as the ratio."""
 
     omega: Scalar
     ratio: Scalar
@@ -187,6 +189,20 @@ class DampedOscillator:
         """Return the change of velocity over an implicit Euler step, exactly."""
         under = 1 + step * 2 * self.ratio * self.omega + np.square(step * self.omega)
         return np.asarray(step * (self.acceleration(0.0, x, v) - step * np.square(self.omega) * v) / under)
+
+    def energy(self, x: Floats, v: Floats) -> float:
+        """Return kinetic and elastic energy in J."""
+        return 0.5 * float(np.square(v).sum() + np.square(self.omega * x).sum())
+
+
+def oscillator(omega: float, damping_ratio: float = 0.0) -> DampedOscillator:
+    """Return an oscillator around the origin of `omega` rad/s, undamped. Raises RangeError.
+
+    A point at the origin stays there: the other end of the spring.
+    """
+    check_range("omega", omega, MIN_OMEGA, MAX_OMEGA, "rad/s")
+    check_range("damping_ratio", damping_ratio, 0.0, MAX_COEFFICIENT)
+    return DampedOscillator(omega, damping_ratio)
 
 
 def damped_limit(name: str, ratio: float) -> float:

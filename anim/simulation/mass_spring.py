@@ -1,4 +1,4 @@
-"""Point masses on damped springs, for cloth and hair by any integrator; the harmonic oscillator."""
+"""Point masses on damped springs, for cloth and hair by any integrator."""
 
 from __future__ import annotations
 
@@ -140,22 +140,3 @@ def _sum_blocks(rows: Ints, columns: Ints, values: Floats, points: int) -> objec
     i = (3 * rows[:, None, None] + np.arange(3)[:, None] + 0 * np.arange(3)).ravel()
     j = (3 * columns[:, None, None] + 0 * np.arange(3)[:, None] + np.arange(3)).ravel()
     return coo_array((values.ravel(), (i, j)), shape=(3 * points, 3 * points)).tocsr()
-
-
-def oscillator(omega: float, damping_ratio: float = 0.0) -> MassSpring:
-    """Return a mass of 1 kg on a spring of length 0 from a pinned point at the origin: points 0 (pinned) and 1.
-
-    omega: rad/s, undamped. Start it at x = (A, 0, 0).
-    """
-    if not (np.isfinite(omega) and omega > 0):
-        raise RangeError(f"`omega` is {omega:g} rad/s (expected above 0)")
-    if not (np.isfinite(damping_ratio) and damping_ratio >= 0):
-        raise RangeError(f"`damping_ratio` is {damping_ratio:g} (expected at least 0)")
-    return MassSpring(
-        np.array([np.inf, 1.0]),
-        np.array([[0, 1]]),
-        np.zeros(1),
-        np.array([omega**2]),
-        np.array([2 * damping_ratio * omega]),
-        gravity=(0.0, 0.0, 0.0),
-    )

@@ -21,7 +21,7 @@ from anim.show.plots.tangent_plot import tangent_plot
 from anim.show.plots.track_plot import LIMIT, Names, track_plot
 from anim.show.plots.track_selection import TrackSelection, compare_selection, select_tracks
 from anim.simulation.comparison import Comparison, compare_integrators
-from anim.simulation.mass_spring import oscillator
+from anim.simulation.integrators import oscillator
 from anim.units import plural
 from cli.errors import UsageError
 from cli.io import documents
@@ -32,7 +32,9 @@ from cli.options.simulation import parse_seconds
 from cli.text import Reporter, format_bytes
 
 NUM_PERIODS = 10  # of the oscillator
-MAX_STEPS = 100_000  # of it
+MAX_STEPS = 10_000  # of it, a thousand a period: more are not seen, and take seconds
+MAX_OMEGA_H = 1e6  # at which all but one method diverge in the first step
+MAX_THROUGH, MIN_GAP_S, MAX_KEYS = 1e12, 1e-6, 1000  # of values and times of --through; between times; of both
 LINE_WIDTH_PX = 2  # of curves in a PNG
 
 
@@ -176,6 +178,8 @@ def _oscillator(omega: float, step: str, kind: str) -> bytes:
     """Picture of an undamped oscillator, ten periods long, by all integrators."""
     seconds = parse_seconds(step, "--step")
     system = oscillator(omega)
+    if omega * seconds > MAX_OMEGA_H:
+        raise UsageError(f"--step is '{step}': --omega times --step is {omega * seconds:.3g} (limit {MAX_OMEGA_H:g})")
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     duration = max(NUM_PERIODS * 2 * np.pi / omega, 2 * seconds)
     if duration / seconds > MAX_STEPS:
@@ -183,7 +187,7 @@ def _oscillator(omega: float, step: str, kind: str) -> bytes:
             f"--step {step} is {duration / seconds:.3g} steps in {NUM_PERIODS} periods (limit {MAX_STEPS})"
         )
     runs = compare_integrators(system, x, np.zeros_like(x), step=seconds, duration=duration)
-    return stability_plot(Comparison(runs, omega * seconds, seconds, system.springs), kind=kind)
+    return stability_plot(Comparison(runs, omega * seconds, seconds, np.array([[0, 1]])), kind=kind)
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:
@@ -218,10 +222,18 @@ def _keys(text: str) -> tuple[Floats, Floats]:
         raise UsageError(f"--through can't read '{text}' (expected 0,0.9,0.2,1 or time:value,…)") from None
     if len(timed) > 1 or len(values) < 2:
         raise UsageError(f"--through has '{text}' (expected two or more values, all of them with a time or none)")
+    if len(values) > MAX_KEYS:
+        raise UsageError(f"--through has {len(values)} values (limit {MAX_KEYS})")
     try:
-        return as_key_times(times), as_floats(values, "K", name="values")
+        found = as_key_times(times), as_floats(values, "K", name="values")
     except DataRangeError as error:
         raise UsageError(f"--through has '{text}': {error}") from None
+    for name, numbers in (("value", values), ("time", times)):
+        if np.abs(numbers).max() > MAX_THROUGH:
+            raise UsageError(f"--through has a {name} of {np.abs(numbers).max():g} (limit {MAX_THROUGH:g})")
+    if (gap := float(np.diff(times).min())) < MIN_GAP_S:
+        raise UsageError(f"--through has times {gap:g} s apart (expected at least {MIN_GAP_S:g} s)")
+    return found
 
 
 def _tracks(
