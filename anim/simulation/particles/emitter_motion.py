@@ -56,29 +56,24 @@ def leave_surfaces(
             raise NotFoundError(f"node '{scene.skeleton.names[node]}' has no surface to emit from")
     at = _around(times, clip)
     jumps = _sorted(chain.from_iterable(_times_of_steps(clip).values()))
-    parts = []
+    corners_of_faces, weights = [], []
     for node, (height, first, second) in zip(nodes, random, strict=True):
         faces, corners = meshes[node].faces, meshes[node].positions[meshes[node].faces]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        chosen = faces[np.searchsorted(np.cumsum(areas) / areas.sum(), height)]
+        corners_of_faces.append(faces[np.searchsorted(np.cumsum(areas) / areas.sum(), height)])
         u, v = np.sqrt(first), second
-        barycentric = np.stack([1 - u, u * (1 - v), u * v], axis=1)
-        points = _vertices(scene, clip, node, at, chosen)
-        positions = np.stack([(barycentric[:, :, None] * each).sum(axis=1) for each in points], axis=1)
-        normals = np.cross(points[1][:, 1] - points[1][:, 0], points[1][:, 2] - points[1][:, 0])
-        parts.append((positions[:, 1], unit_vectors(normals), _velocity(at, positions, jumps)))
-    positions, normals, velocities = (_stack(each) for each in zip(*parts, strict=True))
-    return positions, normals, velocities
+        weights.append(np.stack([1 - u, u * (1 - v), u * v], axis=1))
+    points = _vertices(scene, clip, nodes, at, np.array(corners_of_faces)).reshape(3, -1, 3, 3)
+    barycentric = np.concatenate(weights)[:, :, None]
+    positions = np.stack([(barycentric * each).sum(axis=1) for each in points], axis=1)
+    normals = np.cross(points[1][:, 1] - points[1][:, 0], points[1][:, 2] - points[1][:, 0])
+    velocities = _velocity(np.tile(at, (len(nodes), 1)), positions, jumps)
+    return positions[:, 1], unit_vectors(normals), velocities
 
 
 def unit_vectors(vectors: Floats) -> Floats:
     """Return vectors (n, 3) divided by their lengths; those without a length stay."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
-
-
-def _stack(parts: Sequence[Floats]) -> Floats:
-    found: Floats = np.concatenate([np.empty((0, 3)), *parts])
-    return found
 
 
 def _around(times: Floats, clip: Clip) -> Floats:
@@ -131,13 +126,19 @@ def _velocity(at: Floats, positions: Floats, jumps: Floats) -> Floats:
     return np.asarray(steps.sum(axis=1) / np.maximum(span, 1e-9)[:, None])
 
 
-def _vertices(scene: Scene, clip: Clip, node: int, times: Floats, chosen: Ints) -> list[Floats]:
-    """Positions (n, 3, 3) of the vertices (n, 3) at each column of times (n, 3)."""
+def _vertices(scene: Scene, clip: Clip, nodes: Sequence[int], times: Floats, chosen: Ints) -> Floats:
+    """Positions (3, E, n, 3, 3) of E meshes' vertices (E, n, 3), at each column of times (n, 3).
+
+    One bake of all meshes: a pose of N nodes for each of them would take E times as long.
+    """
     unique, inverse = np.unique(times, return_inverse=True)
     rows = inverse.reshape(times.shape)
-    result = np.empty((times.shape[1], len(times), 3, 3))
-    for chunk in bake(scene, clip, times=unique, rigid=True, nodes=[node]).chunks():
+    cache = bake(scene, clip, times=unique, rigid=True, nodes=sorted(set(nodes)))
+    first_vertex = {part.node: part.vertices[0] for part in reversed(cache.parts)}
+    vertices = chosen + np.array([first_vertex[node] for node in nodes])[:, None, None]
+    result = np.empty((times.shape[1], *chosen.shape, 3))
+    for chunk in cache.chunks():
         for column, row in enumerate(rows.T):
             here = np.flatnonzero((row >= chunk.first) & (row < chunk.first + len(chunk.positions)))
-            result[column, here] = chunk.positions[row[here] - chunk.first][np.arange(len(here))[:, None], chosen[here]]
-    return list(result)
+            result[column][:, here] = chunk.positions[(row[here] - chunk.first)[:, None], vertices[:, here]]
+    return result

@@ -7,14 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+import fixtures
 from anim.arrays import Floats
 from anim.errors import DataRangeError, RangeError, UnsupportedError
-from anim.model import Scene
+from anim.gltf.io import container
+from anim.gltf.reading import reader
+from anim.model import Scene, VertexCache
 from anim.simulation.particles import emitter_motion
 from anim.simulation.particles.emission import BirthPlan, Births, Emitter, emit, plan_births, repeat_births
 from anim.simulation.particles.node_motion import NodeMotion
 from anim.simulation.particles.options import ParticleOptions
 from anim.simulation.particles.simulate import simulate_particles
+from anim.skinning.bake import bake
 from tests.clips import LINEAR, STEP, clip, skeleton, track
 
 
@@ -125,3 +129,24 @@ def test_poses_are_evaluated_once_for_all_emitters(monkeypatch: pytest.MonkeyPat
 def test_emitters_beyond_their_limits_are_refused(change: dict[str, float], words: str) -> None:
     with pytest.raises(RangeError, match=words):
         Emitter((0,), **change)  # type: ignore[arg-type]
+
+
+def test_surfaces_are_baked_once_for_all_emitters(monkeypatch: pytest.MonkeyPatch) -> None:
+    baked: list[object] = []
+
+    def counted(*args: object, **options: object) -> VertexCache:
+        baked.append(options["nodes"])
+        return bake(*args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(emitter_motion, "bake", counted)
+    document = container.read(fixtures.build("wall"))
+    scene = reader.scene(document)
+    nodes = tuple(sorted({each.node for each in scene.instances})[:5])
+    assert len(nodes) == 5
+    played = clip(track("translation", [0, 1], [[0, 0, 0], [1, 2, 3]], node=nodes[1]))
+    together = emit(scene, played, Emitter(nodes, surface=True), 0.0, 0.5, seed=7)
+    assert baked == [list(nodes)]
+    for row, node in enumerate(nodes):
+        alone = emit(scene, played, Emitter((node,), surface=True), 0.0, 0.5, seed=7)
+        for name in ("times", "deaths", "positions", "velocities"):
+            assert (getattr(together, name)[row :: len(nodes)] == getattr(alone, name)).all(), (name, node)
