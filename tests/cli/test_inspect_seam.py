@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import fixtures
 from anim.gltf.document import Document
 from tests.cli.conftest import Call, Fixture
 from tests.cli.inspecting import only
-from tests.files import ASSETS, REAL, glb_of, opened_fixture
+from tests.files import REAL, glb_of, opened_fixture
 
 
 def _same(call: Call, path: Path) -> None:
@@ -30,8 +31,8 @@ def test_fixtures(name: str, call: Call, fixture: Fixture) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REAL)
-def test_real_files(name: str, call: Call) -> None:
-    _same(call, ASSETS / name)
+def test_real_files(name: str, call: Call, asset: Callable[[str], Path]) -> None:
+    _same(call, asset(name))
 
 
 def test_where_there_is_no_skin_it_says_so(call: Call, fixture: Fixture) -> None:
