@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError
+from anim.errors import DataRangeError, RangeError
 from anim.simulation.limits import MAX_LENGTH_M, check_largest, check_range
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape, Vector
 from anim.simulation.spring_bones.collisions import cofactors
@@ -58,15 +58,21 @@ Obstacle = Capsule | Plane
 
 
 def from_spring_colliders(colliders: Iterable[Collider]) -> tuple[Obstacle, ...]:
-    """Return the colliders of spring bones for cloth; those without a size are left out."""
-    found: list[Obstacle] = []
-    for each in colliders:
-        if each.shape is ColliderShape.PLANE:
-            found.append(Plane(each.offset, each.normal, each.node))
-        elif each.radius > 0:
-            end = each.tail if each.shape is ColliderShape.CAPSULE else each.offset
-            found.append(Capsule(each.offset, end, each.radius, each.node, each.node, each.inside))
-    return tuple(found)
+    """Return the colliders of spring bones for cloth; those without a size are left out.
+
+    Raises DataRangeError for a size or position beyond the limits.
+    """
+    try:
+        return tuple(_obstacle(each) for each in colliders if each.radius > 0 or each.shape is ColliderShape.PLANE)
+    except RangeError as error:
+        raise DataRangeError(error.problem, where="a collider of spring bones") from None
+
+
+def _obstacle(collider: Collider) -> Obstacle:
+    if collider.shape is ColliderShape.PLANE:
+        return Plane(collider.offset, collider.normal, collider.node)
+    end = collider.tail if collider.shape is ColliderShape.CAPSULE else collider.offset
+    return Capsule(collider.offset, end, collider.radius, collider.node, collider.node, collider.inside)
 
 
 def place_obstacles(obstacles: Sequence[Obstacle], world: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import NotFoundError
+from anim.errors import DataRangeError, NotFoundError, RangeError
 from anim.gltf.document import Document
 from anim.model import Skeleton
 from anim.sampling import rest_world
@@ -18,13 +18,17 @@ from anim.simulation.rigid_bodies.simulate import read_description
 def read_rigid_colliders(document: Document, skeleton: Skeleton) -> tuple[list[Obstacle], list[int]]:
     """Return the colliders of KHR_physics_rigid_bodies or OMI_physics_body, and the nodes of those of other shapes.
 
-    Sizes have the scale of the nodes at rest. Raises NotFoundError without any that is an obstacle.
+    Sizes have the scale of the nodes at rest. Raises NotFoundError without any that is an obstacle,
+    DataRangeError for one beyond the limits.
     """
     found: list[Obstacle] = []
     others = []
     scales = np.linalg.norm(rest_world(skeleton)[..., :3], axis=-2)
     for node, collider in read_description(document, skeleton).colliders.items():
-        made = _obstacle(collider.shape, node, scales[node])
+        try:
+            made = _obstacle(collider.shape, node, scales[node])
+        except RangeError as error:
+            raise DataRangeError(error.problem, where=f"collider of {skeleton.label(node)}") from None
         if made is None:
             others.append(node)
         else:

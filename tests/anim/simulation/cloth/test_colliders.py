@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fixtures
+from anim.errors import DataRangeError
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.model import Clip
@@ -26,6 +27,11 @@ from tests.anim.simulation.cloth.cases import (
     sheet,
     simulate,
 )
+
+
+def test_a_collider_of_spring_bones_beyond_the_limits_is_a_fault_of_the_file() -> None:
+    with pytest.raises(DataRangeError, match=r"a collider of spring bones: `radius` is 1e\+30 m"):
+        from_spring_colliders([Collider(None, ColliderShape.SPHERE, radius=1e30)])
 
 
 def test_cloth_stays_out_of_colliders_and_above_the_floor() -> None:
