@@ -15,6 +15,7 @@ from anim.operations.selection import track_indices
 from anim.sampling.times import jump_time_after, separate_float32
 
 NEAR_ZERO_S = 5e-4  # starts this near to 0 become 0, since printed times are rounded
+MAX_SPEED = 1e9  # an hour in microseconds
 MIN_DURATION_S = 1e-6  # below, keys of a second fall together in float32
 MAX_END_S = 2.0**24  # s, 194 days; after it, float32 times do not differ by 1 s
 
@@ -125,9 +126,10 @@ def _check_end(clip: Clip, end: float) -> None:
 def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if speed is not None:
         check_number(speed, "speed")
-        if not (math.isfinite(speed) and speed > 0):
+        if not 0 < speed <= MAX_SPEED:
             raise RangeError(
-                f"`speed` is {speed:g} (expected a number above 0)", help="to play it backwards, reverse it"
+                f"`speed` is {speed:g} (expected above 0, at most {MAX_SPEED:g})",
+                help="to play it backwards, reverse it",
             )
         return 1 / speed
     if duration is None:

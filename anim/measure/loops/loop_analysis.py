@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats
+from anim.errors import RangeError
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import JointGap, moving_nodes
@@ -101,8 +102,10 @@ def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float
 
     None is shorter than `shortest` seconds, by default half of the clip. Poses and velocities are compared at the
     clip's frame rate, or at MAX_FRAMES frames if there are more; ranges that start and end within two frames of a
-    better one are left out.
+    better one are left out. Raises RangeError for a negative `shortest`, or one that isn't finite.
     """
+    if not 0 <= shortest < np.inf:
+        raise RangeError(f"`shortest` is {shortest:g} s (expected 0 or more)")
     duration = clip.end - clip.start
     if duration <= 0:
         return []
