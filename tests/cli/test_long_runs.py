@@ -29,7 +29,9 @@ def test_frames_of_a_simulation_count(
     line: tuple[str, ...], who: str, fixture: Fixture, call: Call, tmp_path: Path
 ) -> None:
     kind, name, *options = line
-    out = tmp_path / ("out.npz" if kind == "cloth" else "out.glb")  # morph targets have a limit of their own
+    out = tmp_path / (
+        "out.npz" if kind in ("cloth", "particles") else "out.glb"
+    )  # morphs and nodes have their own limit
     run = call("simulate", kind, fixture(name), out, *options)
     assert who in refusal(run, 4)
     assert "(limit 1 GB)" in run.err
