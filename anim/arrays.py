@@ -16,10 +16,9 @@ Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
 Bytes: TypeAlias = NDArray[np.uint8]
-MAX_SINGLE_M = 1e15  # of coordinates in float32: their squares, and sums of these, are finite
-
 Number = TypeVar("Number", np.float64, np.int64)
 
+MAX_SINGLE_M = 1e15  # of coordinates in float32: their squares, and sums of these, are finite
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
 
 

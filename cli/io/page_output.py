@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path, PurePath
-
-import numpy as np
 
 from anim.files import resolver
 from anim.gltf.document import Document
-from anim.show.page.page import EMPTY, START_VIEW, PageContent, PageFile, PagePanel, PageView, page
+from anim.show.page.page import EMPTY, START_VIEW, PageContent, PageFile, PageView, page
 from anim.show.page.resources import read_script
 from cli.errors import UsageError
-from cli.io import documents
+from cli.io import documents, stdout
 from cli.streams import locate
 from cli.text import Reporter, format_bytes
 
@@ -50,34 +47,18 @@ def write_page(
     reporter: Reporter,
     *,
     content: PageContent = EMPTY,
-    panels: Sequence[PagePanel] = (),
     view: PageView = START_VIEW,
-    title: str = "",
 ) -> None:
-    """Write a page, and report its size. panels: before those of the content."""
-    with commit_page_after(path, file, other, reporter, content=content, panels=panels, view=view, title=title):
+    """Write a page, and report its size."""
+    with commit_page_after(path, page(file, other, view=view, content=content), reporter):
         pass
 
 
 @contextmanager
-def commit_page_after(
-    path: str,
-    file: PageFile,
-    other: PageFile | None,
-    reporter: Reporter,
-    *,
-    content: PageContent = EMPTY,
-    panels: Sequence[PagePanel] = (),
-    view: PageView = START_VIEW,
-    title: str = "",
-) -> Iterator[None]:
-    """Write a page like `write_page`, but replace its file after the block, or not at all if the block fails."""
-    content = replace(content, panels=(*panels, *content.panels))
-    made = page(file, other, title=title, view=view, content=content)
+def commit_page_after(path: str, made: bytes, reporter: Reporter) -> Iterator[None]:
+    """Replace a page's file after the block, or not at all if the block fails; report its size. made: the page."""
     if path == documents.PIPE:
-        documents.write_bytes([np.frombuffer(made, np.uint8)], path)
+        stdout.check_no_terminal()
+    with documents.commit_text_after(made, path):
         yield
-    else:
-        with documents.commit_text_after(made, path):
-            yield
     reporter.info(f"{path}  {format_bytes(len(made))}")

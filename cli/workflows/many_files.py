@@ -77,7 +77,7 @@ def edit_files(
     codes = []
     for pair in pairs:
         try:
-            with _made_folder(pair.output, needed=not dry_run):
+            with _make_folder(pair.output, needed=not dry_run):
                 edit(pair.input, pair.output)
         except UsageError:  # of the options, for all files
             raise
@@ -130,7 +130,7 @@ def _is_output(found: input_files.FoundFile, pattern: str) -> bool:
 
 
 @contextmanager
-def _made_folder(path: str, *, needed: bool) -> Iterator[None]:
+def _make_folder(path: str, *, needed: bool) -> Iterator[None]:
     """Make the folder of a file if it is `needed`; remove what was made, while empty, if the file isn't written."""
     folder = Path(path).parent
     missing = [each for each in (folder, *folder.parents) if needed and not each.exists()]

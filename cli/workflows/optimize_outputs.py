@@ -108,6 +108,7 @@ def write_comparison(
     if html is None or dry_run:
         yield
         return
+    from anim.show.page.page import page
     from cli.io.page_output import commit_page_after, page_file
     from cli.reports.page_panels import size_panels
     from cli.workflows.page_comparison import compare_files, worst_view
@@ -115,6 +116,7 @@ def write_comparison(
     before = page_file(input, about.before, about.size_before)
     after = replace(before, document=about.after, name=PurePath(about.name).name, size=about.size_after)
     content = compare_files(before, after, reporter)
-    view = worst_view(before, content)
-    with commit_page_after(html, before, after, reporter, content=content, panels=size_panels(about), view=view):
+    content = replace(content, panels=(*size_panels(about), *content.panels))
+    made = page(before, after, view=worst_view(before, content), content=content)
+    with commit_page_after(html, made, reporter):
         yield

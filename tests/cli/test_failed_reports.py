@@ -104,7 +104,7 @@ def test_a_model_without_its_page_is_not_replaced(
     fixture: Fixture, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("cli.io.page_output.check_page", lambda *_args: None)  # also without the page's script
-    monkeypatch.setattr("cli.io.page_output.page", _fail)
+    monkeypatch.setattr("anim.show.page.page.page", _fail)
     out, html = tmp_path / "keep.glb", tmp_path / "keep.html"
     for path in (out, html):
         path.write_bytes(b"precious")

@@ -1,4 +1,4 @@
-"""Numbers beyond all sense in every option of `simulate`: a result, or one line that names the option or the limit."""
+"""Numbers beyond the limits in every option of `simulate`: a result, or one line that names the option or the limit."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _options(kind: str) -> Iterator[tuple[str, str, list[str]]]:
 
 
 @pytest.mark.parametrize("kind", BASES)
-def test_numbers_beyond_all_sense_end_in_one_line(kind: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
+def test_numbers_beyond_the_limits_end_in_one_line(kind: str, fixture: Fixture, call: Call, tmp_path: Path) -> None:
     name, *base = BASES[kind]
     if kind == "rigid":
         pytest.importorskip("rapier3d")

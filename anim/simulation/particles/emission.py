@@ -11,7 +11,7 @@ from anim.arrays import Floats, Ints
 from anim.errors import RangeError, UnsupportedError
 from anim.model import Clip, Scene
 from anim.simulation.limits import MAX_LENGTH_M, MAX_SPEED_M_S, check_range
-from anim.simulation.particles.emitter_motion import leave_nodes, leave_surfaces, unit_vectors
+from anim.simulation.particles.emitter_motion import sample_nodes, sample_surfaces, unit_vectors
 
 MAX_PARTICLES = 1_000_000
 MAX_INHERITED = 1e3
@@ -150,9 +150,9 @@ def place_births(scene: Scene, clip: Clip, emitter: Emitter, plan: BirthPlan, cl
     """
     at = clip_start + np.maximum(plan.times, 0.0)
     if emitter.surface:
-        positions, axes, own = leave_surfaces(scene, clip, emitter.nodes, at, plan.surface)
+        positions, axes, own = sample_surfaces(scene, clip, emitter.nodes, at, plan.surface)
     else:
-        positions, axes, own = leave_nodes(scene, clip, emitter.nodes, at, emitter.direction)
+        positions, axes, own = sample_nodes(scene, clip, emitter.nodes, at, emitter.direction)
     velocities = plan.speeds.reshape(-1, 1) * _rotate_z_to(axes, plan.cones.reshape(-1, 3)) + emitter.inherit * own
     times = np.tile(plan.times, len(emitter.nodes))
     order = np.argsort(times, kind="stable")

@@ -18,7 +18,7 @@ VELOCITY_STEP_S = 1e-3  # half the interval of the difference quotient of an emi
 MAX_MATRICES = 1 << 17  # of emitters, in memory at once
 
 
-def leave_nodes(
+def sample_nodes(
     scene: Scene, clip: Clip, nodes: Sequence[int], times: Floats, direction: Sequence[float]
 ) -> tuple[Floats, Floats, Floats]:
     """Return world positions m, unit directions and velocities m/s of E nodes at times (n,) s, all (E · n, 3).
@@ -43,7 +43,7 @@ def leave_nodes(
     return positions[:, :, 1].reshape(-1, 3), unit_vectors(axes.reshape(-1, 3)), velocities.reshape(-1, 3)
 
 
-def leave_surfaces(
+def sample_surfaces(
     scene: Scene, clip: Clip, nodes: Sequence[int], times: Floats, random: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return points of E nodes' skinned meshes at times (n,) s, their normals, and their velocities, all (E · n, 3).

@@ -9,7 +9,7 @@ from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 MAX_FILTERS = 32  # bits of the engine's groups
 
 
-def filter_matches(scene: RigidScene) -> dict[CollisionFilter, list[bool]]:
+def match_filters(scene: RigidScene) -> dict[CollisionFilter, list[bool]]:
     """Return the filters of a scene, in order, each with whether it collides with each of them.
 
     Raises UnsupportedError for more than MAX_FILTERS.

@@ -11,7 +11,7 @@ from anim.arrays import Bools, Floats, Ints
 from anim.errors import UnsupportedError
 from anim.maths import quaternion
 from anim.simulation.rigid_bodies.description import CollisionFilter
-from anim.simulation.rigid_bodies.filters import filter_matches
+from anim.simulation.rigid_bodies.filters import match_filters
 from anim.simulation.rigid_bodies.rigid_scene import BodyKind, RigidScene
 
 # Pairs of boxes around colliders. 20 000 take 80 to 180 MB, and a step of boxes 0.06 to 0.16 s, of round hulls 0.6 s. A
@@ -39,7 +39,7 @@ def check_overlaps(scene: RigidScene) -> None:
 
     Pairs of one body count an eighth, those that filters keep apart not at all. Planes have no box.
     """
-    matches = filter_matches(scene)
+    matches = match_filters(scene)
     boxes = _find_boxes(scene, {each: i for i, each in enumerate(matches)})
     collide = np.array(list(matches.values()), np.bool_)
     most = MAX_PAIRS + MAX_PAIRS_PER_COLLIDER * int(boxes.is_dynamic.sum())

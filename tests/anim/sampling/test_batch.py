@@ -124,7 +124,7 @@ def test_tracks_of_many_axes_are_grouped_by_size(most: int, monkeypatch: pytest.
         assert all(track is moving[number] for track, number in zip(each.tracks, each.numbers.tolist(), strict=True))
 
 
-@pytest.mark.parametrize("most", [1, 40, 10**6])
+@pytest.mark.parametrize("most", [1, 40])
 def test_poses_do_not_depend_on_the_groups(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     moving = [
         clips.track(

@@ -7,7 +7,7 @@ import pytest
 from anim.errors import UnsupportedError
 from anim.simulation.rigid_bodies import overlaps
 from anim.simulation.rigid_bodies.description import CollisionFilter, Shape
-from anim.simulation.rigid_bodies.filters import filter_matches
+from anim.simulation.rigid_bodies.filters import match_filters
 from anim.simulation.rigid_bodies.rigid_scene import RigidScene
 from tests.anim.simulation.rigid_bodies.cases import body
 
@@ -25,16 +25,16 @@ def numbered(number: int) -> CollisionFilter:
 def test_both_of_a_pair_accept_each_other() -> None:
     dust, wall = CollisionFilter(frozenset({"dust"}), collide_with=frozenset({"wall"})), CollisionFilter()
     named = CollisionFilter(frozenset({"wall"}))
-    found = filter_matches(scene(dust, wall, named, dust))
+    found = match_filters(scene(dust, wall, named, dust))
     assert found == {dust: [False, False, True], wall: [False, True, True], named: [True, True, True]}
 
 
 def test_filters_are_counted_before_they_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thousand of them are a million pairs."""
-    assert len(filter_matches(scene(*map(numbered, range(32))))) == 32
+    assert len(match_filters(scene(*map(numbered, range(32))))) == 32
     monkeypatch.setattr(CollisionFilter, "accepts", None)
     many = scene(*map(numbered, range(33)))
-    for check in (filter_matches, overlaps.check_overlaps):
+    for check in (match_filters, overlaps.check_overlaps):
         with pytest.raises(UnsupportedError, match=r"33 different collision filters \(limit 32\)") as caught:
             check(many)
         assert "one filter" in caught.value.help
