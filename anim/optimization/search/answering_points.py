@@ -2,82 +2,118 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats, Ints, unique_sorted
+from anim.arrays import AnyArray, Floats, Ints
 from anim.maths.hierarchy import find_subtrees
 from anim.measure.error.point_matrix import CARRIED, PointMatrix
 
 MIN_OVERLAP = 16  # times that a point answers for a node, on average, from which on maxima of ranges are combined
 BLOCK = 64  # points with one box
 ROUNDING = 1 + 1e-12  # factor of a box's distance: no point of it is farther
-MAX_CACHED = 10_000_000  # indices of points that are cached; those of further nodes are found again each time
 
 
 class AnsweringPoints:
-    """Points P bound to a node or its descendants with a noticeable weight; if none are, with any weight."""
+    """Points P bound to a node or its descendants with a noticeable weight; if none are, with any weight.
+
+    In depth-first order, those of a node are one range: what is noticeable at a node is so at all above it, so that a
+    point is listed at the lowest nodes where it is; a node that has several of these below has it several times.
+    """
 
     def __init__(self, points: PointMatrix, parents: Ints) -> None:
-        """parents: (N,), of all nodes."""
+        """parents: (N,), of all nodes. Weights are 0 or more."""
         self._first, self._end = find_subtrees(parents)
-        self._joint = self._first[points.nodes][points.joints]  # (P, I), positions in depth-first order
-        self._weight = points.factors[..., 3]
-        entries = self._joint.reshape(-1)
-        order = np.argsort(entries, kind="stable")
-        self._sorted, self._point = entries[order], order // max(self._joint.shape[1], 1)
-        self._is_nested = self._joint.shape[1] == 1 and bool((self._weight > CARRIED).all())  # a range for each node
-        self._cached: dict[int, Ints] = {}
-        self._room = MAX_CACHED
-
-    def of(self, node: int) -> Ints:
-        """Return the indices of a node's points, in any order, each once."""
-        if node in self._cached:
-            return self._cached[node]
-        if self._is_nested:
-            start, end = np.searchsorted(self._sorted, (self._first[node], self._end[node]))
-            return np.asarray(self._point[start:end])
-        found = self._find(int(self._first[node]), int(self._end[node]))
-        if len(found) <= self._room:
-            self._room -= len(found)
-            self._cached[node] = found
-        return found
+        joints, weights = self._first[points.nodes][points.joints], points.factors[..., 3]  # (P, I), positions
+        self._noticeable = _PointList(*_lowest_carried(joints, weights, self._first, self._end, parents))
+        point, influence = np.nonzero(weights > 0)
+        self._any = _PointList(joints[point, influence], point)
 
     def radii(self, places: AnyArray, nodes: Sequence[int], centers: AnyArray) -> Floats:
         """Return the largest distance of the points (P, 3, F) of each node (M,) from places of its own (M, 3, F), in m.
 
         0 without points.
         """
-        if self._is_nested:
-            starts, ends = self._ranges(nodes)
+        found = np.zeros(len(nodes))
+        for listed, some, starts, ends in self._spans(nodes):
             if (ends - starts).sum() > MIN_OVERLAP * len(places):
-                return np.sqrt(_farthest_in_ranges(places[self._point], starts, ends, centers))
-        pairs = zip(nodes, centers, strict=True)
-        return np.sqrt(np.array([_farthest(places[self.of(node)], center) for node, center in pairs], np.float64))
+                found[some] = _farthest_in_ranges(places[listed.point], starts, ends, centers[some])
+            else:
+                spans = zip(starts.tolist(), ends.tolist(), centers[some], strict=True)
+                found[some] = [_farthest(places[listed.point[i:j]], center) for i, j, center in spans]
+        return np.sqrt(found)
 
     def largest(self, values: Floats, nodes: Sequence[int]) -> Floats:
         """Return the largest of the values (P,), 0 or more, at the points of each node."""
-        if self._is_nested:
-            starts, ends = self._ranges(nodes)
+        found = np.zeros(len(nodes))
+        for listed, some, starts, ends in self._spans(nodes):
             if (ends - starts).sum() > MIN_OVERLAP * len(values):
-                return _range_maxima(values[self._point], starts, ends)
-        return np.array([values[self.of(node)].max(initial=0.0) for node in nodes], np.float64)
+                found[some] = _range_maxima(values[listed.point], starts, ends)
+            else:
+                spans = zip(starts.tolist(), ends.tolist(), strict=True)
+                found[some] = [values[listed.point[i:j]].max(initial=0.0) for i, j in spans]
+        return found
 
-    def _ranges(self, nodes: Sequence[int]) -> tuple[Ints, Ints]:
-        """Start and end (M,) of each node's points in depth-first order."""
+    def _spans(self, nodes: Sequence[int]) -> Iterator[tuple[_PointList, Ints, Ints, Ints]]:
+        """Lists of points, the indices into `nodes` of those that have points there, and their ranges of the list."""
         chosen = np.array(nodes, np.int64)
-        starts, ends = np.searchsorted(self._sorted, (self._first[chosen], self._end[chosen]))
-        return starts, ends
+        left = np.arange(len(chosen))
+        for listed in (self._noticeable, self._any):
+            starts, ends = listed.ranges(self._first[chosen[left]], self._end[chosen[left]])
+            has = starts < ends
+            yield listed, left[has], starts[has], ends[has]
+            left = left[~has]
 
-    def _find(self, first: int, end: int) -> Ints:
-        some = slice(*np.searchsorted(self._sorted, (first, end)))
-        near = self._point[some]
-        if self._joint.shape[1] > 1:
-            near = unique_sorted(near)
-        joint = self._joint[near]
-        share = (self._weight[near] * ((first <= joint) & (joint < end))).sum(axis=1)
-        return np.asarray(near[share > CARRIED if (share > CARRIED).any() else share > 0])
+
+class _PointList:
+    """Points in depth-first order of the nodes at which they are listed."""
+
+    def __init__(self, at: Ints, point: Ints) -> None:
+        """at: (E,), positions of nodes. point: (E,), indices of points."""
+        order = np.argsort(at, kind="stable")
+        self._at, self.point = at[order], point[order]
+
+    def ranges(self, first: Any, end: Any) -> tuple[Any, Any]:
+        """Start and end in `point` of what is listed at nodes from one position to before another."""
+        return np.searchsorted(self._at, first), np.searchsorted(self._at, end)
+
+
+def _lowest_carried(joints: Ints, weights: Floats, first: Ints, end: Ints, parents: Ints) -> tuple[Ints, Ints]:
+    """Positions of nodes (E,) and points (E,): the lowest nodes with a noticeable weight of a point at and below them.
+
+    joints, weights: (P, I), joints as positions. first, end: (N,), of subtrees. Some nodes above are listed too.
+    """
+    point, influence = np.nonzero(weights > CARRIED)
+    at = joints[point, influence]
+    faint = (weights > 0) & (weights <= CARRIED)  # noticeable together with others below the same node only
+    some = np.flatnonzero(faint.sum(axis=1) > 1)
+    if not len(some):
+        return at, point
+    pairs = np.array(list(combinations(range(joints.shape[1]), 2)))
+    both = faint[some][:, pairs].all(axis=-1)
+    row, pair = np.nonzero(both)
+    low, high = np.sort(joints[some[row, None], pairs[pair]], axis=1).T
+    above = _lowest_common(low, high, first, parents)
+    row, above = row[above >= 0], above[above >= 0]
+    last = np.empty_like(end)
+    last[first] = end
+    own, share = joints[some[row]], weights[some[row]]
+    together = (share * ((above[:, None] <= own) & (own < last[above][:, None]))).sum(axis=1) > CARRIED
+    return np.append(at, above[together]), np.append(point, some[row[together]])
+
+
+def _lowest_common(low: Ints, high: Ints, first: Ints, parents: Ints) -> Ints:
+    """Positions (M,) of the lowest nodes with both of two at or below them; −1 for none.
+
+    It is the first of the parents of all nodes after the one up to the other, in depth-first order.
+    """
+    above = np.empty_like(first)
+    above[first] = np.where(parents >= 0, first[parents], -1)
+    found = len(first) - 1 - _range_maxima(len(first) - 1 - above, low + 1, high + 1).astype(np.int64)
+    return np.where(low == high, low, found)
 
 
 def _farthest(places: AnyArray, center: AnyArray) -> float:
@@ -110,7 +146,7 @@ def _farthest_in_ranges(places: AnyArray, starts: Ints, ends: Ints, centers: Any
     return found
 
 
-def _range_maxima(values: Floats, starts: Ints, ends: Ints) -> Floats:
+def _range_maxima(values: AnyArray, starts: Ints, ends: Ints) -> Floats:
     """The largest of the values (P,), 0 or more, in each range: of two that overlap, each of a power of two values."""
     found, lengths = np.zeros(len(starts)), ends - starts
     width = 1

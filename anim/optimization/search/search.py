@@ -222,7 +222,7 @@ class _Search:
         """Return whether twice the storage error is predicted to fit; the stored error is half its tolerance."""
         assert self._best is not None
         source = self._source
-        used = float(self._best.usage[source.answering.of(source.moving[track].node)].max(initial=0.0))
+        used = float(source.answering.largest(self._best.usage, [source.moving[track].node])[0])
         gain = self._find_leeway()[track] if self._best.plan.rotation_target is RotationTarget.WORLD else 1.0
         miss = self._best.keys[track].error
         return miss > 0 and used + miss * source.moving[track].meters / gain / 2 / self._bound < MAX_FORESEEN_USAGE

@@ -35,29 +35,40 @@ def points_on(points: PointMatrix, parents: Ints, node: int) -> list[int]:
     return np.flatnonzero(share > CARRIED if (share > CARRIED).any() else share > 0).tolist()
 
 
-@pytest.mark.parametrize("cached", [0, 40, answering_points.MAX_CACHED])
-@pytest.mark.parametrize("width", [1, 4])
-@pytest.mark.parametrize("seed", range(4))
-def test_points_of_every_node(seed: int, width: int, cached: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where few of them are stored."""
-    monkeypatch.setattr(answering_points, "MAX_CACHED", cached)
+def found_points(answering: AnsweringPoints, count: int, nodes: int) -> list[list[int]]:
+    """The points of each node: those at which a value is the largest one there."""
+    largest = np.array([answering.largest(row, range(nodes)) for row in np.eye(count)]).reshape(count, nodes)
+    return [np.flatnonzero(column).tolist() for column in largest.T]
+
+
+@pytest.mark.parametrize("width", [1, 2, 4, 8])
+@pytest.mark.parametrize("seed", range(6))
+def test_points_of_every_node(seed: int, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
     points, parents = random_case(seed, width)
     found = AnsweringPoints(points, parents)
     values: Floats = np.random.default_rng(seed).random(POINTS)
-    for _ in range(2):
-        expected = [points_on(points, parents, node) for node in range(NODES)]
-        assert [sorted(found.of(node).tolist()) for node in range(NODES)] == expected
-        most = [values[each].max(initial=0) for each in expected]
+    expected = [points_on(points, parents, node) for node in range(NODES)]
+    most = [values[each].max(initial=0) for each in expected]
+    for overlap in (answering_points.MIN_OVERLAP, 0, 10**6):
+        monkeypatch.setattr(answering_points, "MIN_OVERLAP", overlap)
+        assert found_points(found, POINTS, NODES) == expected
         assert found.largest(values, range(NODES)).tolist() == most
-        with monkeypatch.context() as patched:
-            patched.setattr(answering_points, "MIN_OVERLAP", 0)
-            assert found.largest(values, range(NODES)).tolist() == most
 
 
-def test_maxima_of_nested_points_take_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In a chain every point answers for all nodes above it: not one point after the other."""
+@pytest.mark.parametrize("seed", range(4))
+def test_points_of_many_faint_weights(seed: int) -> None:
+    """Eight joints of a point of which none is noticeable alone, some of them the same; in several trees."""
+    points, parents = random_case(seed, 8)
+    factors = points.factors.copy()
+    factors[..., 3] = np.random.default_rng(seed).choice([0, 0.03, 0.06, CARRIED], size=(POINTS, 8))
+    points = PointMatrix(points.nodes, points.joints, factors)
+    expected = [points_on(points, parents, node) for node in range(NODES)]
+    assert found_points(AnsweringPoints(points, parents), POINTS, NODES) == expected
+
+
+def test_maxima_in_a_chain() -> None:
+    """Every point answers for all nodes above it."""
     count = 1000
-    monkeypatch.setattr(AnsweringPoints, "_find", None)
     points = PointMatrix(np.arange(count), np.arange(count)[:, None], np.ones((count, 1, 4)))
     values = np.random.default_rng(0).random(count)
     found = AnsweringPoints(points, np.arange(-1, count - 1)).largest(values, range(count))
@@ -93,13 +104,12 @@ def test_radii_in_a_chain_look_into_few_blocks(monkeypatch: pytest.MonkeyPatch) 
 
 def test_no_points() -> None:
     none = PointMatrix(np.empty(0, np.int64), np.empty((0, 1), np.int64), np.empty((0, 1, 4)))
-    assert AnsweringPoints(none, np.array([-1, 0])).of(0).tolist() == []
+    assert AnsweringPoints(none, np.array([-1, 0])).largest(np.empty(0), [0, 1]).tolist() == [0, 0]
 
 
 def test_points_answer_for_what_they_noticeably_hang_on() -> None:
     parents = np.array([-1, 0, 1, 1, 0, 0, 0, 0, 0])
     one = PointMatrix(np.array([2, 7]), np.array([[0, 1], [1, 0]]), np.ones((2, 2, 4)) * [[[0.95], [0.05]]])
-    assert AnsweringPoints(one, parents).of(2).tolist() == [0]
+    assert found_points(AnsweringPoints(one, parents), 2, 9)[2:4] == [[0], []]
     faint = PointMatrix(one.nodes, one.joints, 0.1 * one.factors)
-    assert AnsweringPoints(faint, parents).of(2).tolist() == [0, 1]  # where none hangs on it noticeably
-    assert AnsweringPoints(one, parents).of(3).tolist() == []
+    assert found_points(AnsweringPoints(faint, parents), 2, 9)[2] == [0, 1]  # where none hangs on it noticeably
