@@ -15,7 +15,7 @@ from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
 from anim.operations.selection import track_indices
 from anim.sampling import derivatives
 from anim.sampling.batch import Batch
-from anim.sampling.lazy_batch import batches
+from anim.sampling.lazy_batch import lazy_batches
 from anim.sampling.times import frame_times, key_times
 
 KEEP = "keep"
@@ -90,9 +90,9 @@ def _is_constant(track: Track) -> bool:
 
 
 def _sample_tracks(tracks: list[Track], times: Floats) -> list[Floats]:
-    """Values (F, C) of each track at `times`, rotations sign-continuous; a batch per time axis."""
+    """Values (F, C) of each track at `times`, rotations sign-continuous; those of a time axis together."""
     found = [np.zeros(0)] * len(tracks)
-    for batch in batches(tracks):
+    for batch in (part.whole for each in lazy_batches(tracks) for part in each.divide(len(times))):
         values = batch.sample(times)
         if batch.kind is ValueKind.ROTATION:
             values = quaternion.align_signs(_restore_unit_keys(batch, times, values))

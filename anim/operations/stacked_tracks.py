@@ -11,9 +11,7 @@ from numpy.typing import ArrayLike
 
 from anim.arrays import Bools, Floats, freeze
 from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
-from anim.sampling.lazy_batch import batches, lazy_batches
-
-MAX_VALUES = 1 << 18  # keys × components of tracks changed together: of long ones few, for memory
+from anim.sampling.lazy_batch import lazy_batches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,18 +75,11 @@ def change_tracks(clip: Clip, chosen: frozenset[int], change: Callable[[StackedT
     """Return the clip with some tracks, by index, replaced by those that `change` makes of each stack, in its order."""
     numbers = sorted(chosen)
     new = list(clip.tracks)
-    for lazy in lazy_batches(clip.tracks[i] for i in numbers):
-        size = max(MAX_VALUES // lazy.tracks[0].values.size, 1)
-        for first in range(0, len(lazy.tracks), size):
-            part = slice(first, first + size)
-            for i, track in zip(lazy.numbers[part].tolist(), change(_stack(lazy.tracks[part])), strict=True):
-                new[numbers[i]] = track
+    for batch in (part.whole for each in lazy_batches(clip.tracks[i] for i in numbers) for part in each.divide()):
+        stack = StackedTracks(batch.tracks, batch.interpolation, batch.time_axis, batch.values, *(batch.tangents or ()))
+        for i, track in zip(batch.numbers.tolist(), change(stack), strict=True):
+            new[numbers[i]] = track
     return Clip(clip.name, tuple(new))
-
-
-def _stack(tracks: tuple[Track, ...]) -> StackedTracks:
-    batch = batches(tracks)[0]
-    return StackedTracks(tracks, batch.interpolation, batch.time_axis, batch.values, *(batch.tangents or ()))
 
 
 def _by_track(values: Floats | None, count: int) -> Sequence[Any]:

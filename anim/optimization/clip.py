@@ -19,6 +19,7 @@ from anim.optimization.search.source_motion import PATHS, key_grid
 from anim.optimization.tracks import clip_ends, key_reduction, morph_weights, quantization
 from anim.optimization.tracks.quantization import EncodedKeys
 from anim.sampling import times
+from anim.sampling.batch import iterate_concatenated
 from anim.sampling.weight_pointers import moved_nodes
 
 MORPH_BUDGET_FRACTION = 0.4  # of the bound, for morph weights of a clip that moves joints too
@@ -141,17 +142,16 @@ class _TrackSorter:
     def _off_unit_tracks(self) -> frozenset[int]:
         """Tracks whose rotations are so far from unit length that players without normalization differ."""
         rotations = [
-            (i, track.values)
+            (i, track)
             for i, track in enumerate(self._clip.tracks)
             if track.path == "rotation" and track.interpolation is not Interpolation.CUBICSPLINE
         ]
-        if not rotations:
-            return frozenset()
-        numbers, values = zip(*rotations, strict=True)
-        firsts = np.cumsum([0, *map(len, values[:-1])])
-        error = np.maximum.reduceat(np.abs(np.linalg.norm(np.concatenate(values), axis=1) - 1), firsts)
-        is_off = 2 * error * self._context.size > MAX_LENGTH_ERROR_FRACTION * self._task.bound
-        return frozenset(np.array(numbers)[is_off].tolist())
+        found: list[int] = []
+        for group in iterate_concatenated([track for _, track in rotations]):
+            error = np.maximum.reduceat(np.abs(np.linalg.norm(group.values, axis=1) - 1), group.starts)
+            is_off = 2 * error * self._context.size > MAX_LENGTH_ERROR_FRACTION * self._task.bound
+            found += group.numbers[is_off].tolist()
+        return frozenset(rotations[n][0] for n in found)
 
     def _is_invisible(self, i: int) -> bool:
         node = self._clip.tracks[i].node

@@ -203,8 +203,13 @@ def iterate_concatenated(tracks: Sequence[Track]) -> Iterator[ConcatenatedTracks
 def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints) -> ConcatenatedTracks:
     counts = np.array([len(track.values) for track in tracks])
     starts = np.cumsum(counts) - counts
-    times = np.concatenate([track.times for track in tracks])
-    return ConcatenatedTracks(tracks, numbers, counts, starts, times, *stack_values(tracks, np.concatenate))
+    times = _join([track.times for track in tracks])
+    return ConcatenatedTracks(tracks, numbers, counts, starts, times, *stack_values(tracks, _join))
+
+
+def _join(parts: Sequence[Floats]) -> Floats:
+    """One array of several; that of a long track alone is not copied."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def rule_of(track: Track) -> Rule:

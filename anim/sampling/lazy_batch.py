@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import compress
 
 import numpy as np
@@ -67,6 +67,16 @@ class LazyBatch:
             return self
         stacked = self._whole and self._whole.pick(chosen)
         return LazyBatch(tuple(compress(self.tracks, chosen.tolist())), self.numbers[chosen], stacked)
+
+    def divide(self, keys: int = 0) -> Iterator[LazyBatch]:
+        """Yield some of the tracks at a time: at most MAX_STACKED_KEYS keys, of one track if it has more.
+
+        keys: number of keys that become of each track, if they are more.
+        """
+        size = max(MAX_STACKED_KEYS // max(len(self.time_axis), keys), 1)
+        for first in range(0, len(self.tracks), size):
+            part = slice(first, first + size)
+            yield LazyBatch(self.tracks[part], self.numbers[part])
 
     def first_key(self) -> LazyBatch:
         """Return the tracks with their first keys only."""

@@ -15,6 +15,8 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Track
 from anim.model.track import BYTE_UNIT_TOLERANCE
 
+MAX_STACKED_KEYS = 1 << 18  # of a clip's rotations, looked at together
+
 
 def normalize_new(document: Document, clips: Mapping[int, Clip]) -> Mapping[int, Clip]:
     """Return the clips, by index, with unit rotations; tracks that were not unit in the file are kept.
@@ -56,10 +58,14 @@ def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | 
 
 
 def _non_unit_tracks(clip: Clip, chosen: Iterable[int]) -> list[int]:
-    """The chosen tracks of a clip with non-unit rotations, in one array: tracks are many and short."""
+    """The chosen tracks of a clip with non-unit rotations, in one array if they are short: there can be many."""
     rotations = [n for n in chosen if clip.tracks[n].path == "rotation"]
-    if not rotations:
-        return []
+    counts = [len(clip.tracks[n].times) for n in rotations]
+    parts = [rotations] if sum(counts) <= MAX_STACKED_KEYS else [[n] for n in rotations]
+    return [n for part in parts if part for n in _non_unit_part(clip, part)]
+
+
+def _non_unit_part(clip: Clip, rotations: list[int]) -> list[int]:
     counts = [len(clip.tracks[n].times) for n in rotations]
     off = np.abs(_lengths(np.concatenate([clip.tracks[n].values for n in rotations])) - 1) > BYTE_UNIT_TOLERANCE
     if not off.any():
