@@ -8,17 +8,28 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, fields, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from anim.arguments import Length, check_choice, check_function, check_workers, glob_list, meters, radians
+from anim.arguments import (
+    Length,
+    check_choice,
+    check_function,
+    check_max_bytes,
+    check_workers,
+    glob_list,
+    meters,
+    radians,
+)
 from anim.arrays import Floats, as_floats
 from anim.asset import Asset, AssetLike, PathName, as_asset, copy_asset
 from anim.baked_cache import BakedCache, BakeOrigin
 from anim.errors import AnimError, RangeError
+from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.measure.compare import diff as compare
@@ -28,8 +39,10 @@ from anim.measure.error.sample_times import FPS
 from anim.measure.error.surface import diagonal
 from anim.model import Clip
 from anim.operations.selection import Selection, match_names
-from anim.optimization import optimize as search
-from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Request
+from anim.optimization.byte_limit import ByteLimit
+from anim.optimization.file_optimizer import FileOptimizer
+from anim.optimization.optimize import Optimized
+from anim.optimization.options import DEFAULT_MAX_ERROR, EFFORTS, Bounds, Drop, Packing, Policy, Request
 from anim.sampling.sample import PoseTable
 from anim.sampling.sample import sample as sample_table
 from anim.sampling.times import frame_times
@@ -61,7 +74,8 @@ class OptimizeResult:
 def optimize(
     asset: AssetLike,
     *,
-    max_error: Length = "0.01%",
+    max_error: Length | None = None,
+    max_bytes: int | None = None,
     clips: str | Sequence[str] | None = None,
     max_angle: str | float | None = None,
     max_speed_error: Length | None = None,
@@ -75,7 +89,9 @@ def optimize(
 ) -> OptimizeResult:
     """Return the asset with smaller animations and no vertex displaced by more than `max_error`.
 
-    max_error: "0.5mm", "0.01%", or metres; 0 is lossless. clips: globs, all by default; an empty list is refused.
+    max_error: "0.5mm", "0.01%" (the default), or metres; 0 is lossless. max_bytes: of the asset as a GLB, for the
+    smallest error that fits, up to `max_error`, by default 10 % of the diagonal; raises RangeError if nothing fits.
+    clips: globs, all by default; an empty list is refused.
     max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
     keep_nodes: globs for nodes with exact motion. drop: "rest", "unused" or "never", removed channels at the rest pose.
     meshopt: "ext" or "khr" for compression by that extension. effort: "fast", "balanced" or "max".
@@ -91,8 +107,9 @@ def optimize(
     def length(value: Length, name: str) -> float:
         return meters(value, name, lambda: scale, at_least=0.0)
 
+    usual = DEFAULT_MAX_ERROR if max_error is None else max_error
     limits = Bounds(
-        length(max_error, "max_error"),
+        length(usual, "max_error"),
         length(SHELL_PER_DIAGONAL, "shell"),
         MAX_POINTER_ERROR,
         None if max_angle is None else radians(max_angle, "max_angle"),
@@ -101,6 +118,7 @@ def optimize(
     nodes = glob_list(keep_nodes or None, "keep_nodes")
     kept = Selection((), nodes).chosen_nodes(asset.skeleton) if nodes else ()
     check_workers(workers)
+    check_max_bytes(max_bytes)
     if progress is not None:
         check_function(progress, "progress", "a function of the fraction done")
     check_choice("effort", effort, tuple(EFFORTS))
@@ -111,20 +129,39 @@ def optimize(
         Policy(Drop(drop), rebase_rest=rebase_rest, keep=frozenset(kept)),
         Packing.CORE if meshopt is None else Packing(meshopt),
         effort=effort,
-        given=(str(max_error), str(max_angle), str(max_speed_error)),
+        given=(str(usual), str(max_angle), str(max_speed_error)),
     )
     globs = glob_list(clips, "clips")
     chosen = match_names(globs, asset.clips.names, "clip")
-    found = search.optimize(
+    optimizer = FileOptimizer(
         asset.document,
         asset.scene,
         tuple(asset.clips),
-        request,
-        chosen=chosen,
-        workers=workers or os.cpu_count() or 1,
-        progress=progress or (lambda _: None),
+        chosen,
+        scale,
+        _glb_size,
+        workers or os.cpu_count() or 1,
+        progress=lambda: nullcontext(progress or (lambda _: None)),
     )
-    return _build_result(asset, found, limits, chosen)
+    if max_bytes is None:
+        found = optimizer.run(request)
+    else:
+        request, found = _optimize_within(
+            optimizer, request, max_bytes, None if max_error is None else limits.max_error
+        )
+    return _build_result(asset, found, request.bounds, chosen)
+
+
+def _optimize_within(
+    optimizer: FileOptimizer, request: Request, max_bytes: int, ceiling: float | None
+) -> tuple[Request, Optimized]:
+    limit = ByteLimit(optimizer, max_bytes, request, ceiling)
+    found = limit.run()
+    if found.optimized is None:
+        assert found.smallest is not None
+        least = f"expected at least {found.smallest.size}, for an error of up to {limit.max_error:g} m"
+        raise RangeError(f"max_bytes is {max_bytes} ({least})")
+    return found.request, found.optimized
 
 
 def bake(
@@ -228,7 +265,7 @@ def sample_poses(
     return sample_table(asset.skeleton, playing, _times(playing, fps, times), space=space)
 
 
-def _build_result(asset: Asset, found: search.Optimized, limits: Bounds, chosen: Sequence[int]) -> OptimizeResult:
+def _build_result(asset: Asset, found: Optimized, limits: Bounds, chosen: Sequence[int]) -> OptimizeResult:
     bad = [i for i, each in found.verdicts.items() if not each.holds]
     if bad:
         off = found.verdicts[bad[0]].error
@@ -240,14 +277,14 @@ def _build_result(asset: Asset, found: search.Optimized, limits: Bounds, chosen:
         error = found.verdicts[i].error.max_error if i in found.verdicts else 0.0
         errors[f"#{i}" if names[i] in errors else names[i]] = error
     smaller = replace(asset, document=found.document)
-    if found.unchanged or _size(smaller) >= _size(asset):
+    if found.unchanged or _glb_size(found.document) >= _glb_size(asset.document):
         return OptimizeResult(asset, 0.0, dict.fromkeys(errors, 0.0))
     return OptimizeResult(smaller, max(errors.values(), default=0.0), errors)
 
 
-def _size(asset: Asset) -> int:
+def _glb_size(document: Document) -> int:
     """Size in bytes as a GLB."""
-    return sum(len(piece) for piece in container.glb(asset.document))
+    return sum(len(piece) for piece in container.glb(document))
 
 
 def _clip(asset: Asset, key: ClipKey) -> Clip:

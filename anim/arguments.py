@@ -108,6 +108,16 @@ def check_workers(workers: object) -> None:
         raise RangeError(f"workers is {workers} (expected a number of processes, 0 for one per core)")
 
 
+def check_max_bytes(value: object) -> None:
+    """Raise ShapeError or RangeError unless `value` is a number of bytes or None."""
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ShapeError(f"max_bytes is {kind(value)} (expected a number of bytes)")
+    if value < 1:
+        raise RangeError(f"max_bytes is {value} (expected at least 1)")
+
+
 def check_choice(name: str, value: str, known: Sequence[str]) -> None:
     """Raise RangeError unless `value` is one of the known."""
     if value not in known:

@@ -44,6 +44,11 @@ class Optimized:
     without_loss: tuple[int, ...] = ()
     unchanged: bool = False
 
+    @property
+    def max_error(self) -> float:
+        """The largest error of any clip, in metres; 0 without one."""
+        return max((each.error.max_error for each in self.verdicts.values()), default=0.0)
+
 
 def optimize(
     document: Document,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
 PLAYERS = ("spec", "three", "raw", "nlerp")  # "three" can exceed both others: 3 % on Fox
 
 
@@ -151,3 +152,7 @@ class Request:
     def name(self) -> str:
         """Text that is equal for equal requests."""
         return repr(replace(self, bounds=Bounds(0.0, 0.0)) if self.given else self)
+
+    def with_bound(self, max_error: float) -> Request:
+        """Return the request with a computed bound in metres."""
+        return replace(self, bounds=replace(self.bounds, max_error=max_error), given=())

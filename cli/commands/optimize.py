@@ -9,13 +9,22 @@ from typing import Annotated
 import typer
 
 from anim.model import Scene
-from anim.optimization.options import EFFORTS, PLAYERS, Drop, Objective, Packing, Policy, Reference, Request
+from anim.optimization.options import (
+    DEFAULT_MAX_ERROR,
+    EFFORTS,
+    PLAYERS,
+    Drop,
+    Objective,
+    Packing,
+    Policy,
+    Reference,
+    Request,
+)
 from cli.io import documents
 from cli.options import common
 from cli.reports import optimize_report
 from cli.text import Reporter
 from cli.workflows import many_files, optimize_job, optimize_outputs
-from cli.workflows.byte_limit import ByteLimit
 from cli.workflows.edit_clips import note_images
 from cli.workflows.rate_curve import write_curve
 
@@ -161,7 +170,7 @@ def command(
     outputs = optimize_outputs.OptimizeOutputs(report, html, curve_file, dry_run)
     outputs.check_options(out=out, max_bytes=max_bytes)
     lengths = {
-        "max_error": optimize_job.DEFAULT_MAX_ERROR if max_error is None else max_error,
+        "max_error": DEFAULT_MAX_ERROR if max_error is None else max_error,
         "shell": shell,
         "max_pointer_error": max_pointer_error,
         "max_angle": max_angle,
@@ -187,7 +196,7 @@ def command(
         began = time.perf_counter()
         outputs.check_paths(input, output)
         with documents.source(input, reporter) as source:
-            work = optimize_job.optimize_job(
+            optimizer = optimize_job.file_optimizer(
                 source,
                 output,
                 clip=clip or (),
@@ -195,17 +204,14 @@ def command(
                 detailed=report is not None or verbose,
                 reporter=reporter,
             )
-            wanted = request(work.scene)
+            wanted = request(optimizer.scene)
             if curve_file is not None:
-                write_curve(work, wanted, curve_file, reporter, dry_run=dry_run)
+                write_curve(optimizer, wanted, curve_file, source.name, reporter, dry_run=dry_run)
                 return
-            if max_count is None:
-                found = work.run(wanted)
-            else:
-                ceiling = None if max_error is None else wanted.bounds.max_error
-                wanted, found = ByteLimit(work, max_count, wanted, ceiling).run()
-            optimize_report.check(found, work.clips, wanted, work.scale)
-            about = optimize_outputs.describe(work, wanted, found, began)
+            ceiling = None if max_error is None else wanted.bounds.max_error
+            wanted, found = optimize_job.optimize_within(optimizer, wanted, max_count, ceiling)
+            optimize_report.check(found, optimizer.clips, wanted, optimizer.scale)
+            about = optimize_outputs.describe(optimizer, wanted, found, source, output, began)
             with (
                 optimize_outputs.write_report(about, reporter, report, dry_run=dry_run),
                 optimize_outputs.write_comparison(about, reporter, html, input, dry_run=dry_run),

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.writing.references import extensions_naming_keys
-from anim.measure.inspect.storage_cost import storage_costs
-from anim.measure.inspect.stored_bytes import stored_bytes
+from anim.measure.inspect.storage_cost import animation_bytes
 from anim.model import Clip
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Drop, Request
@@ -21,8 +20,6 @@ from anim.units import FEW, format_number, list_some, plural
 from cli.errors import CheckError
 from cli.reports import optimize_bound
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
-
-MIN_PARALLEL_KEYS = 60_000  # keys times tracks; above, worker processes save more time than they cost
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +63,6 @@ class OptimizeReport:
         return isinstance(extras, dict) and KEY in extras
 
 
-def is_long(clips: Sequence[Clip], chosen: Sequence[int]) -> bool:
-    """Return whether several processes are faster than one."""
-    return len(chosen) > 1 and sum(track.values.size for i in chosen for track in clips[i].tracks) > MIN_PARALLEL_KEYS
-
-
 def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: float) -> None:
     """Raise CheckError if a clip exceeds its bounds."""
     bad = {i: each for i, each in found.verdicts.items() if not each.holds}
@@ -91,11 +83,6 @@ def retained_keys(document: Document, clips: Iterable[int]) -> str:
     return f"some old keys stay in the file, since unknown extensions may refer to them ({list_some(places, FEW)})"
 
 
-def worst(found: Optimized) -> float:
-    """Return the largest error of any clip, in metres."""
-    return max((each.error.max_error for each in found.verdicts.values()), default=0.0)
-
-
 def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
     """Return the lines of the summary."""
     dry = " (dry run: nothing written)" if dry_run else ""
@@ -105,7 +92,7 @@ def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
     keys = f"{_keys(about.clips, about)} → {sum(count_keys(each.clip) for each in about.found.solutions.values())} keys"
     summary = [
         f"{about.name}  {format_change(about.size_before, about.size_after)}",
-        f"animation {format_change(cost(about.before), cost(about.after))}",
+        f"animation {format_change(animation_bytes(about.before), animation_bytes(about.after))}",
         keys,
         _worst_words(about),
         format_duration(about.seconds),
@@ -135,11 +122,6 @@ def _clip_line(about: OptimizeReport, number: int, solution: Solution) -> str:
     usual = optimize_bound.of_clip(found, about.request) + usual
     moved = found.error.max_error > FLOAT_NOISE * about.scale
     return f"  {reader.clip_label(source.name, number)}: {counts}, {_error_words(found, about)}{usual if moved else ''}"
-
-
-def cost(document: Document) -> int:
-    """Return the bytes of all animations: keys as stored, and JSON."""
-    return stored_bytes(document) + storage_costs(document)[1].json
 
 
 def _keys(clips: Sequence[Clip], about: OptimizeReport) -> int:

@@ -10,10 +10,11 @@ from pathlib import PurePath
 from anim.check.finding import Finding, Occurrence, Severity
 from anim.gltf.document import Document
 from anim.measure.inspect.report import ClipReport, Facts, SkinReport
+from anim.measure.inspect.storage_cost import animation_bytes
 from anim.show.page.page import ClipFigure, PageLink, PagePanel, PageRow
 from anim.units import format_number, plural
 from cli.reports.inspect_report import MIN_ROOT_DISTANCE_M, PATHS, Inspected, frame_rate
-from cli.reports.optimize_report import OptimizeReport, cost
+from cli.reports.optimize_report import OptimizeReport
 from cli.text import format_bytes, format_change, format_length, format_speed
 
 NEW_SUFFIX = "-new"  # of the file that advised commands write
@@ -93,7 +94,7 @@ def _contents(file_bytes: int, facts: Facts) -> list[tuple[str, str]]:
 
 def size_panels(about: OptimizeReport) -> list[PagePanel]:
     """Return the sizes before and after an optimization."""
-    before, after = cost(about.before), cost(about.after)
+    before, after = animation_bytes(about.before), animation_bytes(about.after)
     rows = (
         PageRow(("file", format_change(about.size_before, about.size_after))),
         PageRow(("animation", format_change(before, after))),

@@ -1,4 +1,4 @@
-"""Optimization of one file: repeated searches, and sizes as written."""
+"""Optimization of one file, as its options ask for."""
 
 from __future__ import annotations
 
@@ -6,132 +6,35 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property
 
 from anim.files import signals
-from anim.gltf.document import Document
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.measure.error.surface import diagonal
-from anim.model import Clip, Scene
+from anim.model import Scene
 from anim.operations.selection import Selection
-from anim.optimization.clip_optimizer import ClipResult
-from anim.optimization.optimize import Optimized, find_results, optimize
+from anim.optimization.byte_limit import ByteLimit
+from anim.optimization.file_optimizer import FileOptimizer
+from anim.optimization.optimize import Optimized
 from anim.optimization.options import Bounds, Request
 from anim.optimization.rate_distortion import RatePoint
-from anim.units import is_zero
+from anim.units import format_number, is_zero, plural
 from cli import units
+from cli.errors import CheckError
 from cli.io import documents, scenes
 from cli.progress import Progress
 from cli.reports import optimize_report
 from cli.streams import step_streams
-from cli.text import Reporter
+from cli.text import Reporter, format_length
 
 START = "fork" if sys.platform == "linux" else "spawn"  # start method of worker processes
-FAST = "fast"  # effort of sizes that are only compared
-DEFAULT_MAX_ERROR = "0.01%"  # of the diagonal
 
 
-@dataclass(frozen=True)
-class OptimizeJob:
-    """A file, its selected clips, and its output.
-
-    chosen: indices of clips. scale: m, the diagonal. detailed: whether verdicts include statistics.
-    """
-
-    source: Source
-    clips: tuple[Clip, ...]
-    scene: Scene
-    chosen: Sequence[int]
-    scale: float
-    output: str
-    workers: int
-    detailed: bool
-    progress: Progress
-
-    def run(
-        self, request: Request, *, verified: bool = True, earlier: Mapping[int, ClipResult] | None = None
-    ) -> Optimized:
-        """Return the document with the result of the search. earlier: results of clips that are not searched again."""
-        searched = [i for i in self.chosen if i not in (earlier or {})]
-        with self._progress_shown() as progress:
-            return optimize(
-                self.source.document,
-                self.scene,
-                self.clips,
-                request,
-                chosen=self.chosen,
-                workers=self._num_workers(searched),
-                start=START,
-                detailed=self.detailed and verified,
-                verified=verified,
-                earlier=earlier,
-                progress=progress,
-            )
-
-    def search(self, request: Request, chosen: Sequence[int], *, verified: bool = True) -> dict[int, ClipResult]:
-        """Return the results of some clips."""
-        with self._progress_shown() as progress:
-            return find_results(
-                self.source.document,
-                self.scene,
-                self.clips,
-                request,
-                chosen=chosen,
-                workers=self._num_workers(chosen),
-                start=START,
-                detailed=self.detailed and verified,
-                verified=verified,
-                progress=progress,
-            )
-
-    def _num_workers(self, searched: Sequence[int]) -> int:
-        return self.workers if optimize_report.is_long(self.clips, searched) else 1
-
-    @contextmanager
-    def _progress_shown(self) -> Iterator[Callable[[float], None]]:
-        """Provide a function that shows the fraction done."""
-        with signals.ignore_broken_pipes():
-            yield lambda fraction: self.progress(round(1000 * fraction))
-        self.progress.close()
-
-    def result(self, found: Optimized) -> tuple[Document, int]:
-        """Return the optimized document, or the source if that takes no more bytes, with its size in bytes."""
-        size = self.size(found.document)
-        if found.unchanged or size >= self._source_size:
-            return self.source.document, self._source_size
-        return found.document, size
-
-    def size(self, document: Document) -> int:
-        """Return the size in bytes of a document as written."""
-        return documents.write(document, self.output, self.source, dry_run=True)
-
-    @cached_property
-    def _source_size(self) -> int:
-        return self.size(self.source.document)
-
-    def point(self, max_error: float, found: Optimized) -> RatePoint:
-        """Return the rate-distortion point of a result within a bound, in m."""
-        document, size = self.result(found)
-        error = 0.0 if document is self.source.document else optimize_report.worst(found)  # the source moves no vertex
-        return RatePoint(max_error, size, error, optimize_report.cost(document))
-
-    def sized(self, request: Request, max_error: float) -> RatePoint:
-        """Return the rate-distortion point of a bound, in m, by a fast search."""
-        return self.point(max_error, self.run(replace(with_bound(request, max_error), effort=FAST)))
-
-
-def with_bound(request: Request, max_error: float) -> Request:
-    """Return the request with a computed bound in metres."""
-    return replace(request, bounds=replace(request.bounds, max_error=max_error), given=())
-
-
-def optimize_job(
+def file_optimizer(
     source: Source, output: str, *, clip: Sequence[str], workers: int, detailed: bool, reporter: Reporter
-) -> OptimizeJob:
-    """Return the job for a source. clip: globs. workers: processes, 0 for one per core.
+) -> FileOptimizer:
+    """Return the optimizer of a source. clip: globs. workers: processes, 0 for one per core.
 
     Raises NotFoundError; FormatError or UnsupportedError if vertices can't be read, since no bound can be verified.
     """
@@ -139,16 +42,55 @@ def optimize_job(
     accessors = Accessors(document)
     clips = tuple(reader.clips(document, accessors))
     scene = scenes.read_scene(document, source.name, reporter, accessors=accessors, repeats=False)
-    return OptimizeJob(
-        source,
-        clips,
+    shown = Progress("optimize", 1000, shown=not reporter.quiet)
+
+    @contextmanager
+    def show_progress() -> Iterator[Callable[[float], None]]:
+        with signals.ignore_broken_pipes():
+            yield lambda fraction: shown(round(1000 * fraction))
+        shown.close()
+
+    return FileOptimizer(
+        document,
         scene,
+        clips,
         Selection(clip).chosen_clips(reader.names(document)),
         diagonal(scene),
-        output,
+        lambda new: documents.write(new, output, source, dry_run=True),
         workers or _cores(),
+        START,
         detailed,
-        Progress("optimize", 1000, shown=not reporter.quiet),
+        show_progress,
+    )
+
+
+def optimize_within(
+    optimizer: FileOptimizer, request: Request, max_bytes: int | None, ceiling: float | None
+) -> tuple[Request, Optimized]:
+    """Return the result, with the request that it answers.
+
+    max_bytes: of the file, else the bounds count. ceiling: m, the greatest allowed error, as of `ByteLimit`.
+    Raises CheckError if nothing fits.
+    """
+    if max_bytes is None:
+        return request, optimizer.run(request)
+    limit = ByteLimit(optimizer, max_bytes, request, ceiling)
+    found = limit.run()
+    if found.optimized is not None:
+        return found.request, found.optimized
+    assert found.smallest is not None
+    raise _refusal(optimizer, max_bytes, limit.max_error, found.smallest)
+
+
+def _refusal(optimizer: FileOptimizer, max_bytes: int, max_error: float, smallest: RatePoint) -> CheckError:
+    """The error for a limit that nothing meets."""
+    percent = f" ({format_number(100 * max_error / optimizer.scale, 2)} %)" if optimizer.scale else ""
+    kept = optimize_report.retained_keys(optimizer.document, optimizer.chosen)
+    return CheckError(
+        f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {format_length(max_error)}{percent} "
+        f"it still takes {plural(smallest.size, 'byte')}, {smallest.animation} of them animation; "
+        f"{kept}{'; ' if kept else ''}nothing was written",
+        help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {smallest.size}",
     )
 
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
 from anim.gltf.io import container
+from anim.gltf.io.source import Source
 from anim.measure.error.surface import is_measured_at
+from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Request
 from cli.errors import UsageError
 from cli.io import documents
 from cli.reports import optimize_json, optimize_report
 from cli.text import Reporter
-from cli.workflows.optimize_job import OptimizeJob
 from cli.workflows.rate_curve import check_curve_file
 
 
@@ -54,15 +55,23 @@ class OptimizeOutputs:
             raise UsageError("--report and OUT can't both be stdout")
 
 
-def describe(work: OptimizeJob, request: Request, found: Optimized, began: float) -> optimize_report.OptimizeReport:
-    """Return the report on an optimization."""
-    source = work.source
-    result, size = work.result(found)
-    name = source.name if work.output == documents.PIPE else work.output
-    measured_at = is_measured_at(work.scene)
-    seconds = time.perf_counter() - began
+def describe(
+    optimizer: FileOptimizer, request: Request, found: Optimized, source: Source, output: str, began: float
+) -> optimize_report.OptimizeReport:
+    """Return the report on an optimization. began: s, when, by `time.perf_counter`."""
+    result, size = optimizer.result(found)
     return optimize_report.OptimizeReport(
-        name, source.document, result, work.clips, found, request, work.scale, source.size, size, seconds, measured_at
+        source.name if output == documents.PIPE else output,
+        source.document,
+        result,
+        optimizer.clips,
+        found,
+        request,
+        optimizer.scale,
+        source.size,
+        size,
+        time.perf_counter() - began,
+        is_measured_at(optimizer.scene),
     )
 
 

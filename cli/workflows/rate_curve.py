@@ -11,14 +11,14 @@ from pathlib import PurePath
 import numpy as np
 
 from anim.errors import FormatError
+from anim.measure.inspect.storage_cost import animation_bytes
+from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, RatePoint, curve
 from anim.units import format_number
 from cli.errors import UsageError
 from cli.io import documents
-from cli.reports.optimize_report import cost
 from cli.text import Reporter, format_bytes, format_length
-from cli.workflows.optimize_job import OptimizeJob
 
 
 def check_curve_file(path: str) -> None:
@@ -28,27 +28,29 @@ def check_curve_file(path: str) -> None:
         raise UsageError(f"{path}: is no .csv, .png or .svg file")
 
 
-def write_curve(work: OptimizeJob, request: Request, path: str, reporter: Reporter, *, dry_run: bool) -> None:
-    """Search with one bound after another, report each size, and write the curve."""
-    if not math.isfinite(work.scale):
+def write_curve(
+    optimizer: FileOptimizer, request: Request, path: str, name: str, reporter: Reporter, *, dry_run: bool
+) -> None:
+    """Search with one bound after another, report each size, and write the curve. name: of the file, for the title."""
+    if not math.isfinite(optimizer.scale):
         raise FormatError(
             "nodes are too far apart for an error in percent of the model's size (its diagonal is infinite)"
         )
     points = []
     bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
-    for point in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
-        reporter.info(_line(point, work.scale))
+    for point in curve(optimizer.scale, lambda max_error: optimizer.find_point(request, max_error), bounds):
+        reporter.info(_line(point, optimizer.scale))
         points.append(point)
     if dry_run:
         return
     kind = PurePath(path).suffix.lower()[1:]
     if kind == "csv":
-        documents.write_text(_csv(points, work.scale), path)
+        documents.write_text(_csv(points, optimizer.scale), path)
     else:
         from anim.show.plots.rate_distortion_plot import rate_distortion_plot
 
-        title, source = PurePath(work.source.name).name, cost(work.source.document)
-        picture = rate_distortion_plot(points, work.scale, title=title, kind=kind, source=source)
+        title, source = PurePath(name).name, animation_bytes(optimizer.document)
+        picture = rate_distortion_plot(points, optimizer.scale, title=title, kind=kind, source=source)
         documents.write_bytes([np.frombuffer(picture, np.uint8)], path)
 
 

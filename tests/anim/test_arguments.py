@@ -14,6 +14,7 @@ import anim
 import fixtures
 from anim import ops
 from anim.arguments import glob_list
+from anim.optimization.file_optimizer import FileOptimizer
 
 Call = Callable[[anim.Asset], object]
 
@@ -45,7 +46,6 @@ WRONG: dict[str, tuple[Call, type[anim.AnimError], str]] = {
     "resample x": (lambda asset: ops.resample(asset.clips[0], fps=_any("x")), anim.ShapeError, "`fps` is 'x'"),
     "bake None": (lambda asset: anim.bake(asset).save(_any(None)), anim.ShapeError, "path is None"),
     "bake file": (lambda asset: anim.bake(asset).save(_any(io.BytesIO())), anim.ShapeError, "path is BytesIO"),
-    "error None": (lambda asset: anim.optimize(asset, max_error=_any(None)), anim.ShapeError, "`max_error` is None"),
     "error True": (lambda asset: anim.optimize(asset, max_error=True), anim.ShapeError, "`max_error` is True"),
     "error -1": (lambda asset: anim.optimize(asset, max_error=-1), anim.RangeError, "metres from 0, or a length"),
     "error 1": (lambda asset: anim.optimize(asset, max_error="1"), anim.RangeError, "without a unit"),
@@ -54,6 +54,8 @@ WRONG: dict[str, tuple[Call, type[anim.AnimError], str]] = {
     "angle -1": (lambda asset: anim.optimize(asset, max_angle=-1), anim.RangeError, "max_angle is -1"),
     "angle list": (lambda asset: anim.optimize(asset, max_angle=_any([1])), anim.ShapeError, "`max_angle` is"),
     "workers -1": (lambda asset: anim.optimize(asset, workers=-1), anim.RangeError, "workers is -1"),
+    "max_bytes 0": (lambda asset: anim.optimize(asset, max_bytes=0), anim.RangeError, "max_bytes is 0"),
+    "max_bytes 9kB": (lambda asset: anim.optimize(asset, max_bytes=_any("9kB")), anim.ShapeError, "max_bytes is str"),
     "workers 1.5": (lambda asset: anim.optimize(asset, workers=_any(1.5)), anim.ShapeError, "workers is float"),
     "progress": (lambda asset: anim.optimize(asset, progress=_any(1)), anim.ShapeError, "progress is int"),
     "clips True": (lambda asset: asset.clips[True], anim.ShapeError, "taken by bool"),
@@ -103,11 +105,11 @@ def test_zero_as_text_is_zero(biped: anim.Asset) -> None:
 def test_zero_workers_are_one_per_core(biped: anim.Asset, monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[int] = []
 
-    def record(*args: object, workers: int, **options: object) -> None:
-        given.append(workers)
+    def record(optimizer: FileOptimizer, *_: object) -> None:
+        given.append(optimizer.workers)
         raise anim.AnimError("enough")
 
-    monkeypatch.setattr("anim.optimization.optimize.optimize", record)
+    monkeypatch.setattr(FileOptimizer, "run", record)
     with pytest.raises(anim.AnimError, match="enough"):
         anim.optimize(biped, workers=0)
     assert given == [os.cpu_count()]

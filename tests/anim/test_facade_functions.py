@@ -56,6 +56,20 @@ def test_an_optimized_asset_keeps_its_bound_and_is_smaller(biped: Path, tmp_path
         anim.optimize(biped, max_error="5 bananas")
 
 
+def test_an_asset_within_a_number_of_bytes(biped: Path, tmp_path: Path) -> None:
+    """Of the file as written, by the smallest error that fits."""
+    limit = 264_000
+    result = anim.optimize(biped, max_bytes=limit, clips="wave", effort="fast")
+    result.save(tmp_path / "fits.glb")
+    assert (tmp_path / "fits.glb").stat().st_size <= limit
+    apart = anim.diff(biped, tmp_path / "fits.glb", clips="wave").max_error
+    assert 0 < apart <= result.max_error * (1 + 1e-6)
+    with pytest.raises(
+        anim.RangeError, match=r"max_bytes is 1000 \(expected at least \d+, for an error of up to 1e-06 m\)"
+    ):
+        anim.optimize(biped, max_bytes=1000, max_error=1e-6, clips="wave", effort="fast")
+
+
 def test_a_missing_clip_is_infinitely_far(biped: Path) -> None:
     asset = anim.load(biped)
     one = {**asset.document.json, "animations": asset.document.json["animations"][:1]}

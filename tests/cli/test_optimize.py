@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from anim.gltf.reading import reader
+from anim.optimization import file_optimizer
 from anim.optimization.writing import KEY
-from cli.reports import optimize_report
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.untouched import around
@@ -251,7 +251,7 @@ def test_never_larger_than_without_loss(fixture: Fixture, tmp_path: Path, call: 
 def test_the_same_bytes_for_any_number_of_jobs(
     fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(optimize_report, "MIN_PARALLEL_KEYS", 0)  # several processes, however little there is to do
+    monkeypatch.setattr(file_optimizer, "MIN_PARALLEL_KEYS", 0)  # several processes, however little there is to do
     for jobs in ("1", "2"):
         run = call("optimize", fixture("noop"), tmp_path / f"{jobs}.glb", "--max-error", "1%", "-j", jobs, *FAST)
         assert run.code == 0, run.err

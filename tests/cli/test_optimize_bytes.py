@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from anim.gltf.io import container
+from anim.optimization import byte_limit
+from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Effort, Request
-from cli.workflows import byte_limit
-from cli.workflows.optimize_job import OptimizeJob
 from fixtures.broken.pieces import buffered, glb
 from tests.cli.comparing import apart
 from tests.cli.conftest import Call, Fixture
@@ -129,19 +129,19 @@ def test_many_clips_of_a_model_without_size(tmp_path: Path, call: Call) -> None:
 def _count_searches(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool, int]]:
     """Effort, whether errors are measured, and number of clips of each search from now on."""
     searched: list[tuple[str, bool, int]] = []
-    run, search = OptimizeJob.run, OptimizeJob.search
+    run, search = FileOptimizer.run, FileOptimizer.search
 
-    def counted(job: OptimizeJob, request: Request, **options: Any) -> Optimized:
+    def counted(file: FileOptimizer, request: Request, **options: Any) -> Optimized:
         if not options.get("earlier"):
-            searched.append((request.effort, options.get("verified", True), len(job.chosen)))
-        return run(job, request, **options)
+            searched.append((request.effort, options.get("verified", True), len(file.chosen)))
+        return run(file, request, **options)
 
-    def counted_some(job: OptimizeJob, request: Request, chosen: Sequence[int], **options: Any) -> Any:
+    def counted_some(file: FileOptimizer, request: Request, chosen: Sequence[int], **options: Any) -> Any:
         searched.append((request.effort, options.get("verified", True), len(chosen)))
-        return search(job, request, chosen, **options)
+        return search(file, request, chosen, **options)
 
-    monkeypatch.setattr(OptimizeJob, "run", counted)
-    monkeypatch.setattr(OptimizeJob, "search", counted_some)
+    monkeypatch.setattr(FileOptimizer, "run", counted)
+    monkeypatch.setattr(FileOptimizer, "search", counted_some)
     return searched
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing.references import views_of
+from anim.measure.inspect.stored_bytes import stored_bytes
 
 
 class StorageCost(NamedTuple):
@@ -22,6 +23,11 @@ class StorageCost(NamedTuple):
     def total(self) -> int:
         """Bytes of both."""
         return self.data + self.json
+
+
+def animation_bytes(document: Document) -> int:
+    """Return the bytes of all animations: keys as stored, and JSON."""
+    return stored_bytes(document) + storage_costs(document)[1].json
 
 
 def storage_costs(document: Document) -> tuple[list[StorageCost], StorageCost]:

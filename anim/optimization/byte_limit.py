@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from anim.optimization.clip_optimizer import ClipResult
+from anim.optimization.fast_sizes import MIN_SAMPLED, FastSizes
+from anim.optimization.file_optimizer import FAST, FileOptimizer
 from anim.optimization.optimize import Optimized, estimate_sizes, is_output_of
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import (
@@ -19,12 +21,6 @@ from anim.optimization.rate_distortion import (
     size_at,
     smallest_bound,
 )
-from anim.units import format_number, plural
-from cli.errors import CheckError
-from cli.reports import optimize_report
-from cli.text import format_length
-from cli.workflows.fast_sizes import MIN_SAMPLED, FastSizes
-from cli.workflows.optimize_job import FAST, OptimizeJob, with_bound
 
 USUAL_RATIO = 0.955  # bytes of animation after a longer search, as a fraction of those after a fast one
 SAMPLE_UNCERTAINTY = 0.025  # fraction by which the bytes of all clips differ from those expected after a sample
@@ -55,35 +51,48 @@ class _Result:
     tried: float
 
 
-class ByteLimit:
-    """A byte limit for the output of a job.
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """The result with the smallest error within a limit, and its request.
 
-    request: its bound counts only as the ceiling. ceiling: m, the greatest allowed error; None for a tenth of the
-    diagonal.
+    optimized: None if nothing fits. smallest: then the point with the fewest bytes that was found.
     """
 
-    def __init__(self, job: OptimizeJob, max_bytes: int, request: Request, ceiling: float | None = None) -> None:
-        self._job = job
+    request: Request
+    optimized: Optimized | None
+    smallest: RatePoint | None = None
+
+
+class ByteLimit:
+    """A limit of bytes for a file as written.
+
+    request: its bound counts only as the ceiling. ceiling: m, the greatest allowed error; None for a tenth of the
+    diagonal. max_error: m, that error.
+    """
+
+    def __init__(self, file: FileOptimizer, max_bytes: int, request: Request, ceiling: float | None = None) -> None:
+        self._file = file
         self._max_bytes = max_bytes
         self._request = request
-        self._fast = FastSizes(job, request)
-        self._most = MAX_BOUND_PER_DIAGONAL * job.scale if ceiling is None else ceiling
+        self._fast = FastSizes(file, request)
+        self.max_error = MAX_BOUND_PER_DIAGONAL * file.scale if ceiling is None else ceiling
         # In the place of the bound: output of the same limit comes back unchanged.
         self._name = ("max_bytes", str(max_bytes), str(ceiling is None), *(request.given or (repr(request.bounds),)))
         self._clips: dict[int, _Clip] = {}  # of those that differ
 
-    def run(self) -> tuple[Request, Optimized]:
-        """Return the request and the result with the smallest error that fits. Raises CheckError if nothing fits."""
-        job, named = self._job, replace(self._request, given=self._name)
-        if is_output_of(job.source.document, job.clips, named, job.chosen):
-            return named, Optimized(job.source.document, {}, {}, unchanged=True)
+    def run(self) -> Fit:
+        """Search for the smallest error that fits."""
+        file, named = self._file, replace(self._request, given=self._name)
+        if is_output_of(file.document, file.clips, named, file.chosen):
+            return Fit(named, Optimized(file.document, {}, {}, unchanged=True))
         ratio = 1.0 if self._request.effort == FAST else USUAL_RATIO
-        bound = smallest_bound(self._max_bytes, job.scale, self._fast.at, ratio=ratio)
-        found = self._find_fitting(self._most if bound is None else min(bound, self._most))
+        bound = smallest_bound(self._max_bytes, file.scale, self._fast.at, ratio=ratio)
+        found = self._find_fitting(self.max_error if bound is None else min(bound, self.max_error))
         best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
         if best is None:
-            raise self._refusal([*(each.point for each in found), self._fast.at(0.0)])
-        return with_bound(self._request, best.point.max_error), best.optimized
+            smallest = min((*(each.point for each in found), self._fast.at(0.0)), key=lambda point: point.size)
+            return Fit(named, None, smallest)
+        return Fit(self._request.with_bound(best.point.max_error), best.optimized)
 
     def _find_fitting(self, bound: float) -> list[_Result]:
         """Results of verified searches: at larger bounds until one fits, then at smaller ones while bytes are unused.
@@ -94,13 +103,13 @@ class ByteLimit:
         found = [self._write()]
         step = 1.0
         for repair in range(MAX_REPAIRS):
-            if self._fits(found[-1]) or found[-1].tried >= self._most:
+            if self._fits(found[-1]) or found[-1].tried >= self.max_error:
                 break
             if repair == MAX_REPAIRS - 1:
                 found += self._find_fast(bound)
                 if self._fits(found[-1]):
                     break
-                self._search(list(self._clips), self._most)
+                self._search(list(self._clips), self.max_error)
             elif repair == MAX_REPAIRS - 2:
                 self._search(list(self._clips), self._fast.fitting_bound(self._max_bytes, above=found[-1].tried))
             else:
@@ -108,7 +117,7 @@ class ByteLimit:
                 step *= 2
             found.append(self._write())
         if not self._fits(found[-1]):
-            return found + self._find_fast(self._most)
+            return found + self._find_fast(self.max_error)
         best = found[-1].point
         for _ in range(MAX_REFINEMENTS):
             point = found[-1].point
@@ -116,12 +125,12 @@ class ByteLimit:
             if self._fits(found[-1]):
                 best = point
                 low = max(bound_below(best, self._max_bytes, self._fast.exponent(best.max_error)), failed)
-                between = bound_between(low, best.max_error, self._job.scale)
+                between = bound_between(low, best.max_error, self._file.scale)
                 if between is None or self._max_bytes - best.size <= MAX_UNUSED_FRACTION * best.animation:
                     break
                 self._search([i for i, each in self._clips.items() if each.bound > between], between)
             else:
-                between = bound_between(failed, best.max_error, self._job.scale)
+                between = bound_between(failed, best.max_error, self._file.scale)
                 if between is None:
                     break
                 self._repair(point, min(self._repair_bound(point), between))
@@ -130,10 +139,10 @@ class ByteLimit:
 
     def _find_fast(self, bound: float) -> list[_Result]:
         """The result of a fast search, which by chance can take fewer bytes; none if it is not likely to fit."""
-        if self._request.effort == FAST or (bound < self._most and self._fast.at(bound).size > self._max_bytes):
+        if self._request.effort == FAST or (bound < self.max_error and self._fast.at(bound).size > self._max_bytes):
             return []
-        request = with_bound(replace(self._request, effort=FAST), bound)
-        results = self._job.search(request, self._fast.clips)
+        request = replace(self._request.with_bound(bound), effort=FAST)
+        results = self._file.search(request, self._fast.clips)
         return [self._write_results(results, bound, bound)]
 
     def _search_groups(self, bound: float) -> None:
@@ -159,7 +168,7 @@ class ByteLimit:
     def _larger_bound(self, rest: Sequence[int], bound: float, *, uncertainty: float = 0.0) -> float:
         """The likely bound, m, of the remaining clips, not below one."""
         wanted = min(self._bound_of(rest, bound, uncertainty=uncertainty), MAX_RAISE_FACTOR * bound)
-        return min(max(wanted, bound), self._most)
+        return min(max(wanted, bound), self.max_error)
 
     def _bound_of(self, some: Sequence[int], bound: float, *, uncertainty: float) -> float:
         """The likely bound, m, of some clips, if the others stay as they are.
@@ -173,10 +182,10 @@ class ByteLimit:
         here = sum(size_at(each.size, each.bound, bound, exponent) for each in self._clips.values())
         ratio = here / max(sum(fast[i] for i in self._clips), 1.0)
         excess = max(ratio * sum(fast[i] for i in some), 1.0) / max(self._max_bytes - other - used, 1.0)
-        if not self._job.scale or abs(math.log(excess)) <= uncertainty:
+        if not self._file.scale or abs(math.log(excess)) <= uncertainty:
             return bound
         excess *= math.exp(math.copysign(uncertainty, -math.log(excess)))
-        return bound_for(excess, bound, self._job.scale, exponent)
+        return bound_for(excess, bound, self._file.scale, exponent)
 
     def _repair(self, point: RatePoint, bound: float) -> None:
         """Search as many clips again, at a larger bound, as are likely to save the bytes too many."""
@@ -198,19 +207,19 @@ class ByteLimit:
         step: factor on the logarithm of the distance from the largest bound that was searched.
         """
         tried = max(each.tried for each in self._clips.values())
-        if not self._job.scale:
-            return self._most
+        if not self._file.scale:
+            return self.max_error
         if len(self._clips) < MIN_SAMPLED or not tried:
-            bound = next_bound(tried, self._job.scale, point, self._max_bytes)
+            bound = next_bound(tried, self._file.scale, point, self._max_bytes)
         else:
             saved = (point.size - self._max_bytes) / max(point.animation, 1) + REPAIR_FRACTION
-            bound = bound_for(1 / max(1 - saved, 0.1), tried, self._job.scale, self._fast.exponent(tried))
-        return min(bound * (bound / tried) ** (step - 1) if tried else bound, self._most)
+            bound = bound_for(1 / max(1 - saved, 0.1), tried, self._file.scale, self._fast.exponent(tried))
+        return min(bound * (bound / tried) ** (step - 1) if tried else bound, self.max_error)
 
     def _search(self, chosen: Sequence[int], bound: float) -> None:
         """Search some clips at a bound, m; a result that is in place and as good within it stays."""
-        request = with_bound(self._request, bound)
-        found = self._job.search(request, chosen) if chosen else {}
+        request = self._request.with_bound(bound)
+        found = self._file.search(request, chosen) if chosen else {}
         for i, size in estimate_sizes(found, request).items():
             old = self._clips.get(i)
             if old is None or old.bound > bound or size < old.size:
@@ -222,26 +231,13 @@ class ByteLimit:
         """Return the file of the clips' results."""
         clips = self._clips.values()
         bound = max((each.bound for each in clips), default=0.0)
-        tried = min((each.tried for each in clips), default=self._most)
+        tried = min((each.tried for each in clips), default=self.max_error)
         return self._write_results({i: each.result for i, each in self._clips.items()}, bound, tried)
 
     def _write_results(self, results: Mapping[int, ClipResult], bound: float, tried: float) -> _Result:
-        named = replace(with_bound(self._request, bound), given=self._name)
-        found = self._job.run(named, earlier=self._fast.of_all(results))
-        return _Result(found, self._job.point(bound, found), tried)
+        named = replace(self._request.with_bound(bound), given=self._name)
+        found = self._file.run(named, earlier=self._fast.of_all(results))
+        return _Result(found, self._file.point(bound, found), tried)
 
     def _fits(self, result: _Result) -> bool:
         return result.point.size <= self._max_bytes
-
-    def _refusal(self, points: Iterable[RatePoint]) -> CheckError:
-        """Return the error for a limit that none of the points meets."""
-        job, most = self._job, self._most
-        least = min(points, key=lambda point: point.size)
-        percent = f" ({format_number(100 * most / job.scale, 2)} %)" if job.scale else ""
-        kept = optimize_report.retained_keys(job.source.document, job.chosen)
-        return CheckError(
-            f"doesn't fit {plural(self._max_bytes, 'byte')}: with an error of up to {format_length(most)}{percent} "
-            f"it still takes {plural(least.size, 'byte')}, {least.animation} of them animation; "
-            f"{kept}{'; ' if kept else ''}nothing was written",
-            help=f"what fits, with your other options: gltf-anim optimize IN OUT --max-bytes {least.size}",
-        )

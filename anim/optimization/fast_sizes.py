@@ -8,32 +8,32 @@ from functools import cached_property
 
 from anim.measure.equal_clips import first_equal
 from anim.optimization.clip_optimizer import ClipResult
+from anim.optimization.file_optimizer import FAST, FileOptimizer
 from anim.optimization.optimize import estimate_sizes
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import FIRST_FRACTION, RatePoint, local_exponent
-from cli.workflows.optimize_job import FAST, OptimizeJob, with_bound
 
 SAMPLE_STEP = 6  # one clip of so many measures sizes at other bounds than the first
 MIN_SAMPLED = 12  # different clips of a file; of fewer all are measured
 
 
 class FastSizes:
-    """Sizes of a job's output at any bound, each found on first use. request: with any bound.
+    """Sizes of an optimized file at any bound, each found on first use. request: with any bound.
 
-    originals: for each of the job's clips, the index of the first one with equal tracks: the others share its data.
+    originals: for each of the chosen clips, the index of the first one with equal tracks: the others share its data.
     clips: indices of the clips that differ. sample: of these, large ones and small ones, that stand for all.
     """
 
-    def __init__(self, job: OptimizeJob, request: Request) -> None:
-        self._job = job
+    def __init__(self, file: FileOptimizer, request: Request) -> None:
+        self._file = file
         self._request = replace(request, effort=FAST)
         self._tried: dict[float, RatePoint] = {}  # by bound
-        first = first_equal([(job.clips[i],) for i in job.chosen])
-        self.originals = {i: job.chosen[k] for i, k in zip(job.chosen, first, strict=True)}
+        first = first_equal([(file.clips[i],) for i in file.chosen])
+        self.originals = {i: file.chosen[k] for i, k in zip(file.chosen, first, strict=True)}
         self.clips = sorted(set(self.originals.values()))
         self.sample = self.clips
         if len(self.clips) >= MIN_SAMPLED:
-            values = {i: sum(track.values.size for track in job.clips[i].tracks) for i in self.clips}
+            values = {i: sum(track.values.size for track in file.clips[i].tracks) for i in self.clips}
             self.sample = sorted(sorted(values, key=lambda i: -values[i])[::SAMPLE_STEP])
 
     def at(self, max_error: float) -> RatePoint:
@@ -61,20 +61,20 @@ class FastSizes:
     @cached_property
     def first(self) -> tuple[RatePoint, dict[int, float]]:
         """The size at the usual bound by a fast search of all clips, and the bytes of each that differs."""
-        usual = FIRST_FRACTION * self._job.scale
-        request = with_bound(self._request, usual)
-        results = self._job.search(request, self.clips, verified=False)
-        found = self._job.run(request, verified=False, earlier=self.of_all(results))
-        return self._job.point(usual, found), estimate_sizes(results, request)
+        usual = FIRST_FRACTION * self._file.scale
+        request = self._request.with_bound(usual)
+        results = self._file.search(request, self.clips, verified=False)
+        found = self._file.run(request, verified=False, earlier=self.of_all(results))
+        return self._file.point(usual, found), estimate_sizes(results, request)
 
     def _measured(self, max_error: float) -> RatePoint:
-        if max_error == FIRST_FRACTION * self._job.scale:
+        if max_error == FIRST_FRACTION * self._file.scale:
             return self.first[0]
         if max_error == 0.0 or self.sample == self.clips:
-            return self._job.point(max_error, self._job.run(with_bound(self._request, max_error), verified=False))
+            return self._file.point(max_error, self._file.run(self._request.with_bound(max_error), verified=False))
         point, first = self.first
-        request = with_bound(self._request, max_error)
+        request = self._request.with_bound(max_error)
         total = sum(first[i] for i in self.sample)
-        found = sum(estimate_sizes(self._job.search(request, self.sample, verified=False), request).values())
+        found = sum(estimate_sizes(self._file.search(request, self.sample, verified=False), request).values())
         animation = round(point.animation * found / max(total, 1.0))
         return RatePoint(max_error, point.size - point.animation + animation, point.error, animation)
