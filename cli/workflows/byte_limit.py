@@ -237,7 +237,8 @@ class ByteLimit:
         """Return the error for a limit that none of the points meets."""
         job, most = self._job, self._most
         least = min(points, key=lambda point: point.size)
-        percent = f" ({format_number(100 * most / job.scale, 2)} %)" if job.scale else ""
+        share = most / job.scale * 100 if job.scale else math.inf
+        percent = f" ({format_number(share, 2)} %)" if math.isfinite(share) else ""
         kept = optimize_report.retained_keys(job.source.document, job.chosen)
         return CheckError(
             f"doesn't fit {plural(self._max_bytes, 'byte')}: with an error of up to {format_length(most)}{percent} "
