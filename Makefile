@@ -26,10 +26,11 @@ test: $(BIN)/.installed $(PAGE)
 slow: $(BIN)/.installed $(PAGE)
 	$(BIN)/python -m pytest -n auto -m slow
 
-# Other random examples of the properties than the gate's, then mutations of fixtures for hours; inputs with faults go to
-# fuzz-out (`python -m tests.fuzz --help`).
+# Other random examples of the properties than the gate's, then absurd values of all options (about ten minutes), and
+# mutations of fixtures for hours; inputs with faults go to fuzz-out (`python -m tests.fuzz --help`).
 fuzz: $(BIN)/.installed $(PAGE)
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --hypothesis-profile random
+	$(BIN)/python -m tests.fuzz --options --keep fuzz-out
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --seed $$(date +%s) --keep fuzz-out
 
 # The reference of commands, and the pages' pictures and output.

@@ -6,19 +6,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from anim.caches.source_document.bake_source import BakeSource
+from anim.errors import RangeError
 
+MIN_INPUT_FPS, MAX_INPUT_FPS = 1e-6, 1e6  # frames per second
 MAX_TARGETS = 256  # morph targets: layers of an array texture in WebGL2, and the limits of bevy and Filament
 
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """fps: frames per second for formats without a rate (PC2, frame sequences, USD without a rate).
+    """input_fps: frames per second for formats without a rate (PC2, frame sequences, USD without a rate).
 
     note: called with a line for each fact that the user should know about the input.
+    Raises RangeError for a rate at which frames have no distinct times, or none at all.
     """
 
-    fps: float | None = None
+    input_fps: float | None = None
     note: Callable[[str], None] = lambda _: None
+
+    def __post_init__(self) -> None:
+        if self.input_fps is not None and not MIN_INPUT_FPS <= self.input_fps <= MAX_INPUT_FPS:
+            limits = f"{MIN_INPUT_FPS:g} to {MAX_INPUT_FPS:g}"
+            raise RangeError(f"`input_fps` is {self.input_fps:g} (expected {limits})")
 
 
 @dataclass(frozen=True, slots=True)

@@ -153,7 +153,8 @@ def writer_for(ending: str) -> Write:
 
 
 def _read(read: Read, inputs: Inputs, reading: ReadOptions) -> VertexCache:
-    with _format_errors(ShapeError if reading.fps else (ShapeError, RangeError)):  # the caller's fps may be too high
+    # The caller's frame rate may be too high
+    with _format_errors(ShapeError if reading.input_fps else (ShapeError, RangeError)):
         cache = read(inputs, reading)
     return replace(cache, chunks=partial(_chunks, cache.chunks))
 

@@ -115,8 +115,9 @@ def _separate_keys(track: Track) -> Track:
 
 def _check_end(clip: Clip, end: float) -> None:
     if end > max(MAX_END_S, clip.end):
+        when = f"at {end:.3g} s" if math.isfinite(end) else "too late"
         raise RangeError(
-            f"the clip would end at {end:.3g} s (limit {MAX_END_S:.0f} s, for times in float32)",
+            f"the clip would end {when} (limit {MAX_END_S:.0f} s, for times in float32)",
             help="gltf-anim trim shortens the clip, and moves a late start to 0 s"
             if clip.end > MAX_END_S
             else "choose a higher `speed`, or a shorter `duration` or `offset`",

@@ -18,6 +18,7 @@ from anim.sampling.times import check_duration, check_fps, frame_times
 from anim.simulation.limits import check_range
 
 MAX_STEPS = 10_000_000
+MAX_STEP_S = 1e6  # a larger one is a mistake, and its products with frequencies are not finite
 FEWER_STEPS = "choose a shorter `duration`, or a longer `step`"
 SHORTER = "choose a shorter `duration`, a lower `fps` or a longer `step`, or raise `memory_limit`"
 
@@ -26,7 +27,8 @@ SHORTER = "choose a shorter `duration`, a lower `fps` or a longer `step`, or rai
 class Steps:
     """Fixed steps of `step_s` seconds from −`warm_up_s` to at least `duration_s`; frames are written from 0 on.
 
-    Raises RangeError for a step that isn't above 0 and negative lengths, UnsupportedError for over ten million steps.
+    Raises RangeError for a step that isn't above 0, or above 10⁶ s, and negative lengths, UnsupportedError for over ten
+    million steps.
     """
 
     step_s: float
@@ -36,8 +38,9 @@ class Steps:
     def __post_init__(self) -> None:
         for name, value in (("step", self.step_s), ("duration", self.duration_s), ("warm_up", self.warm_up_s)):
             check_number(value, name)
-            if not math.isfinite(value) or value < 0 or (value == 0 and name == "step"):
+            if not math.isfinite(value) or value < 0:
                 raise RangeError(f"`{name}` is {value:g} s (expected {'above 0' if name == 'step' else 'at least 0'})")
+        check_range("step", self.step_s, 0.0, MAX_STEP_S, "s", is_above=True)
         if (self.duration_s + self.warm_up_s) / self.step_s > MAX_STEPS:
             raise UnsupportedError(f"more than {MAX_STEPS} steps of {self.step_s:g} s", help=FEWER_STEPS)
 

@@ -88,9 +88,8 @@ def command(
     """
     reporter = text.Reporter(quiet)
     began = time.perf_counter()
-    for name, rate in (("--fps", fps), ("--input-fps", input_fps)):
-        if rate is not None and rate <= 0:
-            raise UsageError(f"{name} is {rate:g} (expected a number above 0)")
+    if fps is not None and fps <= 0:
+        raise UsageError(f"--fps is {fps:g} (expected a number above 0)")
     if at is not None and fps is not None:
         raise UsageError("--at and --fps exclude each other")
     ending = cache_files.check(output, None if format is None else f".{format}")
@@ -110,7 +109,7 @@ def command(
     caches.write_options(ending, given | {"max_error": max_error, "onto": onto})
     with ExitStack() as stack:
         loaded = stack.enter_context(cache_files.load(input, ReadOptions(input_fps)))
-        if input_fps and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
+        if input_fps is not None and "input_fps" not in CACHE_FORMATS[loaded.ending].takes:
             raise UsageError(f"--input-fps does not apply to {loaded.ending}, which stores its frame times")
         if loaded.ending in (".glb", ".gltf"):
             announce_compiling(reporter)

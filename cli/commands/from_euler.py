@@ -36,7 +36,6 @@ from cli.reports import from_euler_report
 from cli.reports.from_euler_report import ConversionReport
 from cli.workflows.character import CharacterOptions, check_name, index_of, named, pairs, put_on_character
 
-MAX_SCALE = 1e15  # as of numbers in files: products of both are lengths that float32 holds
 MAX_HEIGHT_M = 10.0  # m; a taller skeleton is unlikely to be in meters
 
 
@@ -200,8 +199,7 @@ def _check(
     source: str, output: str, format: Format, scale: float | None, onto: str | None, mesh: Mesh, *, dry_run: bool
 ) -> None:
     """Raise UsageError for contradicting options, before any work."""
-    if scale is not None and not 0 < scale <= MAX_SCALE:
-        raise UsageError(f"--scale is {scale:g} (expected a number above 0, at most {MAX_SCALE:g})")
+    common.check_scale(scale)
     if onto is not None and mesh is not Mesh.NONE:
         raise UsageError("--skeleton-mesh makes a body for a new skeleton (--onto has one)")
     if source == onto == documents.PIPE:

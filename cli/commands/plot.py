@@ -179,13 +179,13 @@ def _oscillator(omega: float, step: str, kind: str) -> bytes:
     seconds = parse_seconds(step, "--step")
     system = oscillator(omega)
     if omega * seconds > MAX_OMEGA_H:
-        raise UsageError(f"--step is '{step}': --omega times --step is {omega * seconds:.3g} (limit {MAX_OMEGA_H:g})")
+        most = f"{MAX_OMEGA_H / omega:.3g} s: --omega times --step is at most {MAX_OMEGA_H:g}"
+        raise UsageError(f"--step is '{step}' (expected at most {most})")
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     duration = max(NUM_PERIODS * 2 * np.pi / omega, 2 * seconds)
     if duration / seconds > MAX_STEPS:
-        raise UsageError(
-            f"--step {step} is {duration / seconds:.3g} steps in {NUM_PERIODS} periods (limit {MAX_STEPS})"
-        )
+        least = f"{duration / MAX_STEPS:.3g} s: {MAX_STEPS} steps in {NUM_PERIODS} periods"
+        raise UsageError(f"--step is '{step}' (expected at least {least})")
     runs = compare_integrators(system, x, np.zeros_like(x), step=seconds, duration=duration)
     return stability_plot(Comparison(runs, omega * seconds, seconds, np.array([[0, 1]])), kind=kind)
 

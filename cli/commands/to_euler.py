@@ -139,8 +139,7 @@ def _orders(text: str, kind: TrackFormat) -> OrderRules:
 
 
 def _check(kind: TrackFormat, unit: Unit, frame: AxesConvention, scale: float | None, limit: float | None) -> None:
-    if scale is not None and not (math.isfinite(scale) and scale > 0):
-        raise UsageError(f"--scale is {scale:g} (expected a number above 0)")
+    common.check_scale(scale)
     if kind is not TRACK_FORMATS["bvh"]:
         if scale is not None:
             raise UsageError("--scale is the unit of a BVH (CSV and JSON are in meters)")

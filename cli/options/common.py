@@ -7,7 +7,12 @@ from typing import Annotated
 
 import typer
 
+from cli.errors import UsageError
 from cli.io.output_names import MAX_FILES
+
+# Meters per unit. Numbers in files are at most 1e15, too: their products with a scale are lengths that float32 holds,
+# and a kilometer divided by one can be read again.
+MIN_SCALE, MAX_SCALE = 1e-12, 1e15
 
 Input = Annotated[str, typer.Argument(metavar="IN", help="A .glb or .gltf file, '-' for stdin.", show_default=False)]
 Output = Annotated[
@@ -77,3 +82,9 @@ Quiet = Annotated[
     typer.Option("--quiet", "-q", help="Print only errors, warnings and requested output."),
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print details, such as a line per clip.")]
+
+
+def check_scale(scale: float | None) -> None:
+    """Raise UsageError for meters per unit out of their range."""
+    if scale is not None and not MIN_SCALE <= scale <= MAX_SCALE:
+        raise UsageError(f"--scale is {scale:g} (expected {MIN_SCALE:g} to {MAX_SCALE:g})")

@@ -14,6 +14,7 @@ from anim.caches.registry import CACHE_FORMATS
 from anim.caches.source_document.bake_source import BakeSource, baked_meshes, self_contained
 from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_tangents
 from anim.caches.source_document.shading_normals import with_shading_normals
+from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import RangeError
 from anim.files import resolver
 from anim.gltf.document import Document
@@ -78,6 +79,8 @@ class BakeOptions:
                 f"the range from {first:g} s to {last:g} s is empty (the clip goes from {clip.start:.4g} s to "
                 f"{clip.end:.4g} s)"
             )
+        if last - first < SAME_FRAME_TOLERANCE_S:
+            return np.array([first])
         if self.fps is not None:
             return frame_times(first, last, fps=self.fps)
         inside = clip.key_times[(clip.key_times > first) & (clip.key_times < last)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -84,7 +85,8 @@ def optimize_within(
 
 def _refusal(optimizer: FileOptimizer, max_bytes: int, max_error: float, smallest: RatePoint) -> CheckError:
     """The error for a limit that nothing meets."""
-    percent = f" ({format_number(100 * max_error / optimizer.scale, 2)} %)" if optimizer.scale else ""
+    share = 100 * max_error / optimizer.scale if optimizer.scale else math.inf
+    percent = f" ({format_number(share, 2)} %)" if math.isfinite(share) else ""
     kept = optimize_report.retained_keys(optimizer.document, optimizer.chosen)
     return CheckError(
         f"doesn't fit {plural(max_bytes, 'byte')}: with an error of up to {format_length(max_error)}{percent} "

@@ -45,6 +45,13 @@ def test_keys_are_the_frames_without_a_rate(call: Call, fixture: Fixture, tmp_pa
     assert np.load(out)["times"].tolist() == [0, 0.5, 1]
 
 
+@pytest.mark.parametrize("ending", ["pc2", "png", "npz"])
+def test_a_range_too_short_for_two_frames_is_one(ending: str, call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    range_s = ("--from", "0.5", "--to", "0.5000001", "--fps", "4")
+    run = call("bake", fixture("tube"), tmp_path / f"a.{ending}", "--clip", "twist180", *range_s)
+    assert ", 1 frame of " in run.err
+
+
 def test_several_clips_need_a_place_for_their_names(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     source = fixture("arm")
     run = call("bake", source, tmp_path / "arm.npz")

@@ -152,7 +152,8 @@ def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
         (["a.npz", "--at", "9"], "no frame at 9 s"),
         (["a.npz", "--at", "0", "--fps", "9"], "exclude each other"),
         (["a.npz", "--fps", "0"], "--fps is 0 (expected a number above 0)"),
-        (["a.npz", "--input-fps", "-1"], "--input-fps is -1 (expected a number above 0)"),
+        (["a.npz", "--input-fps", "-1"], "--input-fps is -1 (expected 1e-06 to 1e+06)"),
+        (["a.npz", "--input-fps", "1e18"], "--input-fps is 1e+18 (expected 1e-06 to 1e+06)"),
         (["no/a.npz"], "there is no folder"),
     ],
 )

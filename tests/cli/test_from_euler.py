@@ -144,6 +144,7 @@ def test_the_report_as_json(call: Call, tmp_path: Path) -> None:
         (("--angle-tolerance", "0"), SMALL, 2, "--angle-tolerance is '0'"),
         (("--angle-tolerance", "1mm"), SMALL, 2, "--angle-tolerance is '1mm'"),
         (("--scale", "0"), SMALL, 2, "--scale is 0"),
+        (("--scale", "1e-13"), SMALL, 2, "--scale is 1e-13 (expected 1e-12 to 1e+15)"),
         (("--fail-unmatched", "0"), SMALL, 2, "require --onto (the character)"),
         (("--bind-time", "0"), SMALL, 2, "require --onto (the character)"),
         (("--replace", "walk"), SMALL, 2, "require --onto (the character)"),

@@ -208,6 +208,12 @@ def test_a_model_without_size(tmp_path: Path, call: Call) -> None:
         assert (run.code, "bug" in run.err) in ((0, False), (6, False)), run.err
 
 
+def test_a_bound_whose_share_of_the_model_is_beyond_all_numbers(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    options = ("--max-error", "1e308m", "--max-bytes", "100", *FAST)
+    said = refusal(call("optimize", fixture("arm"), tmp_path / "out.glb", *options), 6)
+    assert "with an error of up to 1e+308 m it still takes" in said
+
+
 def test_too_few_bytes(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     run = call("optimize", fixture("arm"), tmp_path / "out.glb", "--max-bytes", "100", *FAST)
     assert "doesn't fit 100 bytes" in refusal(run, 6)

@@ -77,6 +77,7 @@ def test_tracks_are_put_into_the_driving_clip(fixture: Fixture, call: Call, tmp_
         (("--node", "head", "--rate", "0"), 2, "no particle is emitted"),
         (("--node", "head", "--fps", "0"), 2, "--fps is 0"),
         (("--node", "head", "--emit", "surface"), 5, "no surface"),
+        (("--node", "body", "--emit", "surface", "--rate", "1e-320"), 2, "no particle is emitted"),
         (("--node", "head", "--report", "out.txt"), 2, "unsupported report format"),
         (("--node", "head", "--rate", "1e9"), 4, "limit 1000000"),
         (("--node", "head", "--integrator", "euler"), 2, "none of explicit-euler"),

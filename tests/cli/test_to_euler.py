@@ -108,6 +108,7 @@ def test_the_clip_must_be_one(call: Call, fixture: Fixture) -> None:
         (("--unit", "rad"), "a BVH's angles are intrinsic"),
         (("--angle-tolerance", "1deg"), "--angle-tolerance adds keys"),
         (("--scale", "-1"), "--scale is -1"),
+        (("--scale", "1e-13"), "--scale is 1e-13 (expected 1e-12 to 1e+15)"),
         (("--scale", "1", "--format", "csv"), "--scale is the unit of a BVH"),
         (("--fps", "0"), "fps is 0"),
         (("--format", "fbx"), "to-euler"),

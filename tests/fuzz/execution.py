@@ -25,10 +25,11 @@ BATCH = 40  # command lines per process: forking takes as long as a short comman
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A command line, and the files that it finds in its folder."""
+    """A command line, the files in its folder, and the option that alone can be at fault, if they are sound."""
 
     line: Sequence[str]
     files: Mapping[str, bytes]
+    option: str = ""
 
 
 @dataclass(frozen=True, slots=True)

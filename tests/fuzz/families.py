@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -38,6 +39,9 @@ RIGS = "rigs"  # the family of sound files, whose outputs are judged
 SETTINGS = {"gltf-anim.toml", "pyproject.toml"}
 CRASHES = (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGILL, signal.SIGBUS)
 CODES = (0, 3, 4, 5, 6)  # 2 is for command lines, and those here are sound
+OPTION_CODES = (0, 2, 4, 5, 6)  # 3 is for files
+CONTRADICTIONS = ("in the file (got", "which it moves itself")  # option and file are right, each by itself
+NO_NUMBER = re.compile(r"(?<![\w'])-?(nan|inf)(?![\w'])")
 
 GLTF_FIXTURES = ("arm", "morph_cube", "interpolations", "pointer", "gltf_embedded")
 GLTF_LINES = (
@@ -169,13 +173,12 @@ FAMILIES = (*SEEDS, RIGS)
 
 
 def problems(job: Job, outcome: Outcome) -> list[str]:
-    """Return the faults of an outcome: what no input may cause. Wrong settings are wrong usage."""
+    """Return the faults of an outcome: what no input and no option may cause."""
     found = list(outcome.problems)
-    words_of_questions = QUESTIONS if not SETTINGS & set(job.files) else ("",)
-    is_question = outcome.code == 2 and any(words in outcome.err for words in words_of_questions)
-    is_crash = job.line[0] == usd_layers.NAME and -outcome.code in CRASHES  # of usd-core, in what is a child elsewhere
-    if outcome.code not in CODES and not is_question and not is_crash:
+    if not _is_right_code(job, outcome):
         found.append(f"exit code {outcome.code}")
+    if job.option and NO_NUMBER.search(outcome.err.replace(job.line[-1].partition("=")[2] or "=", "")):
+        found.append("a message without a number")
     if outcome.cpu_s > CPU_LIMIT_S or outcome.code == -24:
         found.append(f"{outcome.cpu_s:.1f} s")
     if outcome.peak_bytes > MAX_PEAK_BYTES or "out of memory" in outcome.err:
@@ -184,6 +187,16 @@ def problems(job: Job, outcome: Outcome) -> list[str]:
     if any(len(line) > MAX_LINE_LENGTH for line in outcome.err.splitlines()):
         found.append("a long message")
     return found
+
+
+def _is_right_code(job: Job, outcome: Outcome) -> bool:
+    """Return whether a job may end so. Wrong settings are wrong usage."""
+    if job.option:
+        return outcome.code in OPTION_CODES or any(words in outcome.err for words in CONTRADICTIONS)
+    words_of_questions = QUESTIONS if not SETTINGS & set(job.files) else ("",)
+    is_question = outcome.code == 2 and any(words in outcome.err for words in words_of_questions)
+    is_crash = job.line[0] == usd_layers.NAME and -outcome.code in CRASHES  # of usd-core, in what is a child elsewhere
+    return outcome.code in CODES or is_question or is_crash
 
 
 def look(line: Sequence[str], code: int, names: Sequence[str], out: bytes, err: str) -> list[str]:

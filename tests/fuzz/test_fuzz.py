@@ -1,4 +1,7 @@
-"""Mutations of fixtures end well: no traceback, no exit code 2, no hang, no memory, no output that can't be read."""
+"""Mutations of fixtures end well: no traceback, no exit code 2, no hang, no memory, no output that can't be read.
+
+Absurd values of options do too, but with exit code 2 and not 3.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,12 @@ from random import Random
 
 import pytest
 
+from cli.command_table import COMMANDS
+from cli.commands.simulate import KINDS
 from tests.cli.running import ENVIRONMENT, ROOT
+from tests.fuzz.execution import Job
 from tests.fuzz.mutations import MUTATIONS, mutate
+from tests.fuzz.options import plain_jobs, shorten, value_options
 
 FOUND = Path(__file__).with_name("found")
 COUNTS = {  # mutations; 10 to 30 s each
@@ -48,6 +55,36 @@ def test_mutations_end_well(family: str) -> None:
     pytest.importorskip("rapier3d")
     run = fuzz(family, "--count", str(COUNTS[family]), "--seed", "17")
     assert run.returncode == 0, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("trim", "retime", "diff", "--count", "60"), pytest.param(("--count", "1000"), marks=pytest.mark.slow)],
+)
+def test_absurd_values_of_options_end_well(arguments: tuple[str, ...]) -> None:
+    pytest.importorskip("rapier3d")
+    run = fuzz("--options", *arguments, "--seed", "17")
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+@pytest.mark.slow
+def test_the_options_of_every_command_are_swept() -> None:
+    lines = [" ".join(job.line) for job in plain_jobs()]
+    commands = [*(name for name in COMMANDS if name != "simulate"), *(f"simulate {kind}" for kind in KINDS)]
+    assert [each for each in commands if not any(line.startswith(f"{each} ") for line in lines)] == []
+
+
+def test_options_that_name_files_are_not_swept() -> None:
+    found = value_options(["from-euler", "a.bvh", "out.glb"])
+    assert {"--order", "--scale", "--memory-limit"} <= set(found)
+    assert not {"--onto", "--alias", "--depfile", "--dry-run"} & set(found)
+    assert "--attractor" in value_options(["simulate", "particles", "a.glb", "out.glb"])
+
+
+def test_only_options_that_a_fault_needs_stay() -> None:
+    job = Job(["bake", "a.glb", "a.npz", "--rigid", "--fps", "4", "--method", "dqs", "--to=nan"], {}, "--to")
+    shorter = shorten(job, lambda each: "--fps" in each.line)
+    assert shorter.line == ["bake", "a.glb", "a.npz", "--fps", "4", "--to=nan"]
 
 
 @pytest.mark.slow

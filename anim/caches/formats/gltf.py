@@ -68,14 +68,14 @@ def _buffer_name(main: str, number: int) -> str:
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the frames of a flip-book of this library, or the first clip of another glTF as frames.
 
-    Morph targets and skins (linear blend) are evaluated at the clip's own keys, or at `reading.fps`.
+    Morph targets and skins (linear blend) are evaluated at the clip's own keys, or at `reading.input_fps`.
     """
     with read_all(inputs, inputs.main) as data:
         document = container.read(np.frombuffer(data, np.uint8), lambda name: _beside(inputs, name))
     found = read_pages(document)
     if found is not None:
         return found
-    played = evaluate_document(document, fps=reading.fps, note=reading.note)
+    played = evaluate_document(document, fps=reading.input_fps, note=reading.note)
     if names := directions(document):
         reading.note(f"{' and '.join(names)} are not played: bake the glTF file with them")
     return played

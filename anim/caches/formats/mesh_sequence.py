@@ -28,15 +28,15 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
     All have the format of `ending`, whatever their names.
     Remaining frames of an older, longer sequence of this library are ignored: the first file states the frame count.
     Raises FormatError for a missing frame, as after an interrupted write.
-    Times are those stored in this library's files, else frames at `reading.fps` or 24 per second. The first frame gives
-    the faces; every other must have as many vertices.
+    Times are those stored in this library's files, else frames at `reading.input_fps` or 24 per second. The first frame
+    gives the faces; every other must have as many vertices.
     """
     names = sequence_members(inputs)
     with read_all(inputs, names[0]) as data:
         first = mesh_frame.read(data, ending)
     names = _of_one_sequence(inputs.main, names, first.remark.get("frames", ""))
     return VertexCache(
-        _times(inputs, names, reading.fps),
+        _times(inputs, names, reading.input_fps),
         len(first.positions),
         first.faces,
         lambda: _chunks(inputs, names, first, ending),

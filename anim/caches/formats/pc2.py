@@ -27,7 +27,7 @@ DEFAULT_FPS = 24.0  # Blender's default, for files of other programs, which have
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     """Return the cache in the main file, with the faces of its rest mesh if there is one.
 
-    Frames per second: `reading.fps`, or the rest mesh's, or 24.
+    Frames per second: `reading.input_fps`, or the rest mesh's, or 24.
     """
     with inputs.open(inputs.main) as file:
         data = read_exactly(file, HEADER.size, "the header")
@@ -38,7 +38,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
             raise FormatError(f"header has start frame {start:g} and {step:g} frames per sample")
         frame_blocks.check_size(file, HEADER.size, samples, points)
     beside = rest_mesh.read(inputs, HEADER.size, samples, points, reading.note)
-    fps = reading.fps or beside.fps or DEFAULT_FPS
+    fps = reading.input_fps or beside.fps or DEFAULT_FPS
     times = np.round((start + step * np.arange(samples)) / fps, 9)
     return VertexCache(
         times - min(times[0], 0.0),

@@ -31,7 +31,7 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str = ".usd") -> Verte
     """
     with _run(inputs, ending, usd_meshes.summary) as summaries:
         stage: usd_meshes.StageSummary = next(summaries)
-    rate = reading.fps or stage.rate
+    rate = reading.input_fps or stage.rate
     parts = parts_of(stage.kept)
     return VertexCache(
         stage.codes / rate - min(stage.codes[0] / rate, 0.0),

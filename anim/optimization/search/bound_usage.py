@@ -149,7 +149,9 @@ class BoundUsage:
         usage = np.empty((len(self._clips.points), len(at)))
         for rows, some in self._rows.blocks(change):
             moved = some.reshape(-1, 3, *at.shape)  # (P', 3, b, W)
-            speeds = 0.0 if most is None or not gaps.size else _longest(np.diff(moved, axis=3) / gaps) / most
+            speeds: float | Floats = 0.0
+            if most is not None and gaps.size:  # float32 has no number for the smallest bounds
+                speeds = np.divide(_longest(np.diff(moved, axis=3) / gaps), most, dtype=np.float64)
             usage[rows] = np.maximum(_longest(moved) / self._allowed[rows][:, clips], speeds)
         return usage
 

@@ -57,11 +57,11 @@ def simulate_particles(scene: Scene, clip: Clip, emitter: Emitter, options: Part
     plan = plan_births(emitter, start, options.duration, options.seed)
     if options.max_nodes is not None:
         check_simultaneous(plan.count_simultaneous(options.duration, is_loop=options.loop), options.max_nodes)
-    births = place_births(scene, clip, emitter, plan, options.start)
-    if not len(births):
+    if not plan.lifetimes.size:
         raise RangeError(
             f"no particle is emitted in {options.duration:g} s", help="raise `rate`, `burst` or `duration`"
         )
+    births = place_births(scene, clip, emitter, plan, options.start)
     _check_speed(births)
     num_emitted = len(births)
     if options.loop:

@@ -65,7 +65,7 @@ def test_array_errors_of_contents_are_format_errors(monkeypatch: pytest.MonkeyPa
     with pytest.raises(FormatError, match="times not increasing at key 1"):
         reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions())
     with pytest.raises(RangeError):  # with the caller's fps it may be the caller's error
-        reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions(1e9))
+        reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions(1e6))
     _use(monkeypatch, replace(CACHE_FORMATS[".mdd"], read=_bad_chunk))
     read = reader_for(".mdd")(Memory("a.mdd", {}), ReadOptions())
     for _ in range(2):

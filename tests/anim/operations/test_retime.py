@@ -183,3 +183,5 @@ def test_keys_that_no_float32_time_tells_apart_are_left_to_the_writer() -> None:
 def test_a_clip_beyond_the_seconds_of_float32_is_refused() -> None:
     with pytest.raises(RangeError, match=r"the clip would end at 3e\+30 s \(limit 16777216 s"):
         changed(TRACKS["linear"], speed=1e-30)
+    with pytest.raises(RangeError, match=r"the clip would end too late \(limit 16777216 s"):
+        changed(TRACKS["linear"], speed=1e-320)

@@ -72,6 +72,8 @@ def test_a_clip_that_is_too_long_is_refused_as_a_rate_is() -> None:
     assert check_duration(1, MAX_FRAMES / 30 + 1, fps=30) == MAX_FRAMES
     with pytest.raises(UnsupportedError, match=r"1\.2e\+07 frames at 120 fps \(limit 10000000\)"):
         check_duration(0, 1e5, fps=120)
+    with pytest.raises(UnsupportedError, match=r"too many frames at 60 fps \(limit 10000000\)"):
+        check_duration(0, 1e308, fps=60)
 
 
 def test_key_times_are_float32_and_distinct() -> None:

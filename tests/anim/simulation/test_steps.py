@@ -18,7 +18,9 @@ def test_steps_are_counted_by_integers() -> None:
     np.testing.assert_array_equal(Steps(0.1, 1.0).frames(4), [0, 0.25, 0.5, 0.75, 1])
 
 
-@pytest.mark.parametrize("values", [(0.0, 1.0), (-1.0, 1.0), (0.1, -1.0), (np.nan, 1.0), (0.1, np.inf), (1e-9, 1e9)])
+@pytest.mark.parametrize(
+    "values", [(0.0, 1.0), (-1.0, 1.0), (0.1, -1.0), (np.nan, 1.0), (0.1, np.inf), (1e-9, 1e9), (1e308, 1.0)]
+)
 def test_steps_without_sense_are_refused(values: tuple[float, float]) -> None:
     with pytest.raises((RangeError, UnsupportedError)):
         Steps(*values)

@@ -86,7 +86,7 @@ def test_frames_of_others_have_a_rate() -> None:
     mesh: Any = trimesh.Trimesh(np.eye(3), [[0, 1, 2]], process=False)
     files = Memory("a.ply", {f"a_{i}.ply": mesh.export(file_type="ply") for i in (9, 10, 11)})
     assert opened(files).times == pytest.approx(np.arange(3) / 24)
-    assert opened(files, ReadOptions(fps=10)).times == pytest.approx(np.arange(3) / 10)
+    assert opened(files, ReadOptions(input_fps=10)).times == pytest.approx(np.arange(3) / 10)
 
 
 def test_quads_of_others_are_cut() -> None:

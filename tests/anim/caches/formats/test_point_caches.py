@@ -84,7 +84,7 @@ def test_back_again(name: str) -> None:
 def test_a_pc2_without_its_rest_mesh() -> None:
     files = Memory("a.pc2", {"a.pc2": written(cache(), "a.pc2")[0].files["a.pc2"]})
     assert opened(files).times[1] == pytest.approx(1 / 24)
-    assert opened(files, ReadOptions(fps=10)).times[1] == pytest.approx(0.1)
+    assert opened(files, ReadOptions(input_fps=10)).times[1] == pytest.approx(0.1)
     assert len(opened(files).faces) == 0
 
 

@@ -91,6 +91,16 @@ def test_speeds_count_where_they_are_bounded() -> None:
         assert found[:, b] == pytest.approx(expected, rel=1e-4)
 
 
+def test_a_bound_on_speeds_that_float32_does_not_hold() -> None:
+    changed = [_changed(source, b) for b, source in enumerate(_truths())]
+    clips = stack(*CLIPS)
+    bounds = (replace(SPEED, max_speed_error=each) for each in (1e-20, 1e-200))
+    small, least = (
+        BoundUsage(OF.skeleton, clips, ALLOWED, each).slerp_raw(_stacked(clips, changed), EVERY) for each in bounds
+    )
+    assert least == pytest.approx(1e180 * small, rel=1e-5)
+
+
 def test_angles_of_ancestors_add_up() -> None:
     """Each rotation counts with those above it, and with the largest sum below it, by scipy and loops."""
     changed = [_changed(source, b) for b, source in enumerate(_truths())]
