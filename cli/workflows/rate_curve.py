@@ -8,8 +8,6 @@ import math
 from collections.abc import Sequence
 from pathlib import PurePath
 
-import numpy as np
-
 from anim.errors import FormatError
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, RatePoint, curve
@@ -39,17 +37,18 @@ def write_curve(work: OptimizeJob, request: Request, path: str, reporter: Report
     for point in curve(work.scale, lambda max_error: work.sized(request, max_error), bounds):
         reporter.info(_line(point, work.scale))
         points.append(point)
-    if dry_run:
-        return
-    kind = PurePath(path).suffix.lower()[1:]
-    if kind == "csv":
-        documents.write_text(_csv(points, work.scale), path)
-    else:
-        from anim.show.plots.rate_distortion_plot import rate_distortion_plot
+    made = _render(points, work, PurePath(path).suffix.lower()[1:])
+    if not dry_run:
+        documents.write_text(made, path)
 
-        title, source = PurePath(work.source.name).name, cost(work.source.document)
-        picture = rate_distortion_plot(points, work.scale, title=title, kind=kind, source=source)
-        documents.write_bytes([np.frombuffer(picture, np.uint8)], path)
+
+def _render(points: Sequence[RatePoint], work: OptimizeJob, kind: str) -> str | bytes:
+    if kind == "csv":
+        return _csv(points, work.scale)
+    from anim.show.plots.rate_distortion_plot import rate_distortion_plot
+
+    title, source = PurePath(work.source.name).name, cost(work.source.document)
+    return rate_distortion_plot(points, work.scale, title=title, kind=kind, source=source)
 
 
 def _line(point: RatePoint, scale: float) -> str:

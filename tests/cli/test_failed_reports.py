@@ -9,6 +9,7 @@ import pytest
 from anim.errors import FormatError
 from anim.show.page.page import PageContent, PageFile
 from tests.cli.conftest import Call, Fixture
+from tests.cli.running import refusal
 
 KINDS = [
     ("particles", "biped", ("--node", "head", "--duration", "0.1")),
@@ -31,6 +32,28 @@ def no_report(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
 
     name = "cli.reports.json_report.dump" if request.param == "infinity" else "cli.io.documents.commit_text_after"
     monkeypatch.setattr(name, fail)
+
+
+@pytest.mark.parametrize(("kind", "name", "options"), KINDS, ids=[kind for kind, _, _ in KINDS])
+def test_a_dry_run_makes_the_report_of_a_simulation_and_writes_none(
+    kind: str,
+    name: str,
+    options: tuple[str, ...],
+    fixture: Fixture,
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if kind == "rigid":
+        pytest.importorskip("rapier3d")
+    report = tmp_path / "report.json"
+    args = (kind, fixture(name), tmp_path / "out.glb", *options, "--dry-run", "--report")
+    call("simulate", *args, report).product()
+    assert "expected .json" in refusal(call("simulate", *args, tmp_path / "report.txt"), 2)
+    monkeypatch.setattr("cli.reports.json_report.dump", _fail)
+    run = call("simulate", *args, report)
+    assert (run.code, run.err.count("no report of it is possible")) == (3, 1), run.err
+    assert [path.name for path in tmp_path.iterdir()] == [f"{name}.glb"]
 
 
 @pytest.mark.usefixtures("no_report")
@@ -109,8 +132,35 @@ def test_a_model_without_its_page_is_not_replaced(
     out, html = tmp_path / "keep.glb", tmp_path / "keep.html"
     for path in (out, html):
         path.write_bytes(b"precious")
-    run = call("optimize", fixture("noop"), out, "--html", html)
-    assert (run.code, out.read_bytes(), html.read_bytes()) == (3, b"precious", b"precious"), run.err
+    for dry_run in ((), ("--dry-run",)):
+        run = call("optimize", fixture("noop"), out, "--html", html, *dry_run)
+        assert (run.code, out.read_bytes(), html.read_bytes()) == (3, b"precious", b"precious"), run.err
+
+
+@pytest.mark.parametrize(
+    ("option", "maker"),
+    [
+        (("--report", "a.json"), "cli.reports.optimize_json.as_json"),
+        (("--html", "a.html"), "anim.show.page.page.page"),
+        (("--curve", "a.csv"), "cli.workflows.rate_curve._csv"),
+    ],
+)
+def test_a_dry_run_of_optimize_makes_its_other_outputs_and_writes_none(
+    option: tuple[str, str],
+    maker: str,
+    fixture: Fixture,
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("cli.io.page_output.check_page", lambda *_args: None)
+    monkeypatch.setattr("anim.show.page.page.page", lambda *_args, **_options: b"page")
+    args = ("optimize", fixture("arm"), tmp_path / "o.glb", "-n", "--effort", "fast", option[0], tmp_path / option[1])
+    assert call(*args).product() == b""
+    monkeypatch.setattr(maker, _fail)
+    run = call(*args)
+    assert (run.code, run.err.count("no report of it is possible")) == (3, 1), run.err
+    assert [path.name for path in tmp_path.iterdir()] == ["arm.glb"]
 
 
 CACHES = [
