@@ -50,7 +50,8 @@ def too_many_frames(
     frames: float, fps: float, *, limit: int = MAX_FRAMES, help: str = FEWER_FRAMES
 ) -> UnsupportedError:
     """Return the error for more frames than the limit, whether the motion is too long or the rate too high."""
-    return UnsupportedError(f"{frames:.3g} frames at {fps:g} fps (limit {limit})", help=help)
+    count = f"{frames:.3g}" if math.isfinite(frames) else "over 1e+308"
+    return UnsupportedError(f"{count} frames at {fps:g} fps (limit {limit})", help=help)
 
 
 def frame_times(start: float, end: float, *, fps: float, help: str = FEWER_FRAMES) -> Floats:
