@@ -1,8 +1,9 @@
-"""Validation of arrays: type, named shape, finiteness, read-only."""
+"""Validation of arrays: type, named shape, finiteness, read-only; equal values."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Iterable
 from dataclasses import fields
 from typing import Any, TypeAlias, TypeVar
 
@@ -17,6 +18,7 @@ Bools: TypeAlias = NDArray[np.bool_]
 AnyArray: TypeAlias = NDArray[Any]
 Bytes: TypeAlias = NDArray[np.uint8]
 Number = TypeVar("Number", np.float64, np.int64)
+Key = TypeVar("Key", bound=Hashable)
 
 MAX_SINGLE_M = 1e15  # of coordinates in float32: their squares, and sums of these, are finite
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
@@ -78,6 +80,17 @@ def unique_sorted(values: NDArray[Number]) -> NDArray[Number]:
     """Return the distinct values in increasing order (np.unique loads a quarter of numpy for that)."""
     ordered = np.sort(values, kind="stable")  # merges sorted parts, as times mostly are
     return ordered[np.concatenate(([True], ordered[1:] > ordered[:-1]))] if len(ordered) else ordered
+
+
+def group_indices(keys: Iterable[Key]) -> dict[Key, list[int]]:
+    """Return the indices of equal keys, by key, in the order of the first ones.
+
+    group_indices("abca") → {"a": [0, 3], "b": [1], "c": [2]}; of the parents of nodes: the children of each
+    """
+    found: dict[Key, list[int]] = {}
+    for i, key in enumerate(keys):
+        found.setdefault(key, []).append(i)
+    return found
 
 
 def is_finite(array: AnyArray) -> bool:

@@ -15,6 +15,7 @@ _ZERO = r"\s*0+(\.0*)?\s*(%|m|cm|mm|um|µm)?\s*"
 _ZERO_ANGLE = r"\s*0+(\.0*)?\s*(deg|°|rad)?\s*"
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+MAX_FRACTION = 1e6  # of a length or a range; with more, limits computed from it can exceed all numbers
 MAX_LISTED = 8  # names in a message
 FEW = 3  # names in a message about something else
 MIN_EXPONENT_VALUE = 1e15  # more digits than a double has; 1e300 would be a line of 301
@@ -40,14 +41,14 @@ def list_some(names: Sequence[str], most: int = MAX_LISTED) -> str:
 
 
 def parse_fraction(text: str, name: str) -> float:
-    """Return a fraction above 0: "0.1%" or a number without unit. Raises RangeError otherwise.
+    """Return a fraction above 0, at most MAX_FRACTION: "0.1%" or a number without unit. Raises RangeError otherwise.
 
     parse_fraction("0.1%", "--tolerance") → 0.001
     """
     value, unit = _split(text, name)
     if unit not in ("", "%") or value <= 0:
         raise RangeError(f"{name} is '{text}' (expected a share above 0, like 0.1% or 0.001)")
-    return value / 100 if unit else value
+    return _check_fraction(value / 100 if unit else value, text, name)
 
 
 def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
@@ -58,7 +59,7 @@ def parse_length(text: str, name: str, diagonal: Callable[[], float]) -> float:
     value, unit = _split(text, name)
     if (unit not in LENGTHS and unit != "%") or value <= 0:
         raise RangeError(f"{name} is '{text}' (expected a length above 0, like 0.5mm, 2cm or 0.1%)")
-    return value / 100 * diagonal() if unit == "%" else value * LENGTHS[unit]
+    return _check_fraction(value / 100, text, name) * diagonal() if unit == "%" else value * LENGTHS[unit]
 
 
 def is_zero(text: str) -> bool:
@@ -94,6 +95,12 @@ def parse_size(text: str, name: str) -> int:
     if size < 1:
         raise RangeError(f"{name} is '{text}' (expected a size like 800kB, 1.5MB or 65536)")
     return int(size)
+
+
+def _check_fraction(value: float, text: str, name: str) -> float:
+    if value > MAX_FRACTION:
+        raise RangeError(f"{name} is '{text}' (expected at most {100 * MAX_FRACTION:g}%)")
+    return value
 
 
 def _split(text: str, name: str) -> tuple[float, str]:

@@ -7,9 +7,9 @@ from itertools import compress
 
 import numpy as np
 
-from anim.arrays import Bools, Ints
+from anim.arrays import Bools, Ints, group_indices
 from anim.model import Interpolation, TimeAxis, Track
-from anim.sampling.batch import Batch, MixedBatch, Rule, rule_of, stack_values
+from anim.sampling.batch import Batch, MixedBatch, rule_of, stack_values
 
 MAX_STACKED_KEYS = 1 << 18  # of the tracks of a batch; of a longer one only those requested are stacked, call by call
 MAX_MIXED_KEYS = 1 << 15  # of the tracks of an axis, of which a copy with those of other axes pays
@@ -95,12 +95,10 @@ def mixed_batches(tracks: Iterable[Track]) -> tuple[list[LazyBatch], list[MixedB
 
     Of more than MAX_STACKED_KEYS keys, long axes are batches of their own, and several hold that many.
     """
-    tracks, groups = tuple(tracks), dict[Rule, list[int]]()
-    for i, track in enumerate(tracks):
-        groups.setdefault(rule_of(track), []).append(i)
+    tracks = tuple(tracks)
     single: list[LazyBatch] = []
     mixed: list[MixedBatch] = []
-    for group in groups.values():
+    for group in group_indices(map(rule_of, tracks)).values():
         axes = [
             LazyBatch(each.tracks, np.array(group)[each.numbers]) for each in lazy_batches(tracks[i] for i in group)
         ]
@@ -146,9 +144,8 @@ def _mix(batches: list[LazyBatch]) -> MixedBatch:
 
 def lazy_batches(tracks: Iterable[Track]) -> list[LazyBatch]:
     """Return `tracks` grouped by time axis and rule, in the order of their first members."""
-    tracks, groups = tuple(tracks), dict[tuple[TimeAxis, Rule], list[int]]()
-    for i, track in enumerate(tracks):
-        groups.setdefault((track.time_axis, rule_of(track)), []).append(i)
+    tracks = tuple(tracks)
+    groups = group_indices((track.time_axis, rule_of(track)) for track in tracks)
     return [LazyBatch(tuple(tracks[i] for i in group), np.array(group)) for group in groups.values()]
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager
 from enum import StrEnum
-from pathlib import PurePath
 from typing import Annotated
 
 import typer
@@ -18,6 +18,7 @@ from anim.skinning.bake import SPACES, bakeable_instances
 from cli import text
 from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
+from cli.io.cache_folders import StagedFolder
 from cli.options import caches, common, meshes
 from cli.options.meshes import ABOUT, Method
 from cli.progress import announce_compiling
@@ -126,7 +127,7 @@ def command(
     files = FileOptions(ending, values, max_error, up, vertex_order, keep_skeleton, dry_run)
     files.check(normals=bool(normals), tangents=bool(tangents))
     if html is not None:
-        from cli.workflows.cache_page import check_cache_page, write_cache_page  # imports all readers of curves
+        from cli.workflows.cache_page import check_cache_page, commit_cache_page_after  # imports all readers of curves
 
         moved = {"--space mesh": space is not WORLD, "--up": up is not None, "--vertex-order": vertex_order is not None}
         check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
@@ -152,7 +153,15 @@ def command(
         )
         if not rigid and not keeps_nodes(ending) and bakeable_instances(scene, nodes=nodes):
             bake_notes.left_out_note(scene, nodes, reporter)
-        run = BakeRun(source, scene, options, files, reporter)
+
+        def commit_with(staged: StagedFolder) -> AbstractContextManager[None]:
+            if html is None:
+                return cache_files.commit_alone(staged)
+            (job,) = jobs
+            chosen = [] if job.clip is None else [f"#{job.clip}"]
+            return commit_cache_page_after(html, (input, job.file), staged, chosen, reporter, dry_run=dry_run)
+
+        run = BakeRun(source, scene, options, files, reporter, commit_with)
         played = [Clip("", ()) if job.clip is None else clips[job.clip] for job in jobs]
         first = first_equal([(each,) for each in played]) if len(jobs) > 1 else [-1]
         for job, each, n in zip(jobs, played, first, strict=True):
@@ -164,10 +173,6 @@ def command(
     run.report_findings()
     took = text.format_duration(time.perf_counter() - began) + (text.DRY if dry_run else "")
     reporter.info(f"{summarize_files(run.files, method.value)}, {took}")
-    if html is not None and not dry_run:
-        (baked,) = run.files
-        path = str(PurePath(baked.file).with_name(baked.saved.files[-1]))
-        write_cache_page(html, input, path, [] if baked.number is None else [f"#{baked.number}"], reporter)
 
 
 def _read_scene(

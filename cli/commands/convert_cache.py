@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
-from pathlib import PurePath
 from typing import Annotated, Any
 
 import typer
@@ -20,10 +19,11 @@ from anim.units import plural
 from cli import text, units
 from cli.errors import UsageError
 from cli.io import cache_files, documents
+from cli.io.cache_folders import StagedFolder
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
 from cli.workflows.bake_clip import Output, choose_clip, onto_source
-from cli.workflows.cache_page import check_cache_page, write_cache_page
+from cli.workflows.cache_page import check_cache_page, commit_cache_page_after
 
 Cache = Annotated[
     str,
@@ -124,8 +124,16 @@ def command(
             )
         writing = caches.write_options(ending, given)
         progress = Progress(loaded.name, cache.frame_count, shown=not quiet)
+
+        def commit_with(staged: StagedFolder) -> AbstractContextManager[None]:
+            progress.close()  # whose bar is not for this
+            if html is None:
+                return cache_files.commit_alone(staged)
+            return commit_cache_page_after(html, (input, output), staged, (), reporter, dry_run=dry_run)
+
+        counted = _counted(cache, progress)
         try:
-            saved = cache_files.save(_counted(cache, progress), output, writing, ending=ending, dry_run=dry_run)
+            saved = cache_files.save(counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with)
         finally:
             progress.close()
         size = loaded.size
@@ -145,8 +153,6 @@ def command(
         parts.append(f"{len(saved.files)} files")
     parts.append(text.format_duration(time.perf_counter() - began))
     reporter.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
-    if html is not None and not dry_run:
-        write_cache_page(html, input, str(PurePath(output).with_name(saved.files[-1])), (), reporter)
 
 
 def _changed(

@@ -122,13 +122,13 @@ def command(
     if new is not None and (one is None or other is None or are_bake_and_source(one, other)):
         if plot is not None or player is not SPEC:
             raise UsageError(f"{'--plot' if plot is not None else '--player'} does not apply to caches and bakes")
+        from cli.workflows.vertex_diff import compare_document, diff_by_vertex
+
         opened = {
-            side.file.name: (side.document, side.file.size, side.scene.store_repeats())
+            side.file.name: compare_document(side.file.name, side.file.size, side.document, side.scene.store_repeats())
             for side in (one, other)
             if side is not None
         }
-        from cli.workflows.vertex_diff import diff_by_vertex
-
         found_by_vertex = diff_by_vertex(old, new, clip or (), fps, reporter, opened=opened)
         words = _vertex_words(found_by_vertex, format, reporter, quiet=quiet)
         if html is not None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.storage import suffix
 from anim.errors import AnimError, DataRangeError, FormatError, OutputError, not_written
 from anim.files import resolver
+from anim.files.atomic import AtomicOutputs
 from anim.model import VertexCache
 from anim.units import plural
 from cli.errors import UsageError
@@ -25,6 +27,7 @@ from cli.io import cache_folders, depfile, documents
 from cli.text import Reporter
 
 BVH = ".bvh"  # motion of joints, for other commands
+CommitWith: TypeAlias = Callable[[cache_folders.StagedFolder], AbstractContextManager[None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,17 +66,23 @@ class SavedCache:
             reporter.info(f"note: {note}")
 
 
+def commit_alone(_staged: cache_folders.StagedFolder) -> AbstractContextManager[None]:
+    """Make no output beside a cache."""
+    return nullcontext()
+
+
 @contextmanager
-def load(path: str, reading: ReadOptions) -> Iterator[LoadedCache]:
+def load(path: str, reading: ReadOptions, *, staged: cache_folders.StagedFolder | None = None) -> Iterator[LoadedCache]:
     """Give the cache at `path`, "-" for stdin, its format by file extension or by its first bytes.
 
     Its frames are read on demand, so use it inside the block; errors raised there name the input.
+    staged: its files, if they are not yet renamed.
     """
     name = "stdin" if path == documents.PIPE else path or "''"
     notes: list[str] = []
     with ExitStack() as stack:
         try:
-            inputs = cache_folders.inputs(path, stack)
+            inputs = cache_folders.inputs(path, stack) if staged is None else staged
             ending = _ending(inputs)
             if path == documents.PIPE:
                 check_pipe(name, ending)
@@ -119,10 +128,20 @@ def check_pipe(name: str, ending: str) -> None:
         raise UsageError(f"{name}: {ending[1:]} is several files (expected a file name)")
 
 
-def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, dry_run: bool = False) -> SavedCache:
+def save(
+    cache: VertexCache,
+    path: str,
+    writing: WriteOptions,
+    *,
+    ending: str,
+    dry_run: bool = False,
+    commit_with: CommitWith = commit_alone,
+) -> SavedCache:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
     Companion files (a rest mesh) are left out on stdout, with a note.
+    commit_with: makes other outputs of the written files, and replaces theirs after the cache's: an error of it leaves
+    all files as they were. Not called for stdout.
     """
     is_pipe = path == documents.PIPE
     if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
@@ -137,12 +156,12 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
             written = registry.writer_for(ending)(cache, staged, writing)
             names = staged.names[-1:] if is_pipe else staged.names
             size = staged.size(names)
-            if not dry_run and is_pipe:
+            if is_pipe and not dry_run:
                 cache_folders.to_stdout(staged)
-            elif not dry_run:
-                if staged.main not in names:  # a file a frame: a rule of the name itself would always be out of date
-                    depfile.add_output(path, os.path.join(os.path.dirname(path), min(names)))
-                staged.commit()
+            elif not is_pipe:
+                with commit_with(cache_folders.StagedFolder(staged)):
+                    if not dry_run:
+                        _commit(staged, path)
         except OSError as error:
             raise not_written(away if is_pipe else path, error) from None
         finally:
@@ -151,6 +170,12 @@ def save(cache: VertexCache, path: str, writing: WriteOptions, *, ending: str, d
     left = unwritable_note(staged.names[:-1]) if is_pipe else ()
     orphans = () if is_pipe else orphan_warnings(path, names, ending)
     return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)), orphans)
+
+
+def _commit(staged: AtomicOutputs, path: str) -> None:
+    if staged.main not in staged.names:  # a file a frame: a rule of the name itself would always be out of date
+        depfile.add_output(path, os.path.join(os.path.dirname(path), min(staged.names)))
+    staged.commit()
 
 
 def _ending(inputs: cache_folders.CacheFolder) -> str:

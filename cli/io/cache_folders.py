@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from anim.arrays import Bytes
 from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
 from anim.errors import FormatError, not_written
@@ -28,7 +29,10 @@ def inputs(path: str, stack: ExitStack) -> CacheFolder:
     Raises UsageError if stdin is a terminal; FormatError if a requested file can't be opened.
     """
     documents.check_name(path)
-    return CacheFolder(Path(path)) if path != documents.PIPE else _received(stack)
+    if path == documents.PIPE:
+        return _received(stack)
+    real = resolver.resolve_links(Path(path))
+    return CacheFolder(real.parent, real.name)
 
 
 def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
@@ -49,13 +53,12 @@ def to_stdout(staged: AtomicOutputs) -> None:
 
 
 class CacheFolder:
-    """Input files of one folder."""
+    """Input files of one folder. main: with links resolved."""
 
-    def __init__(self, path: Path) -> None:
-        path = resolver.resolve_links(path)
-        self.main = path.name
+    def __init__(self, folder: Path, main: str) -> None:
+        self.main = main
         self.sizes: dict[str, int] = {}
-        self._folder = path.parent
+        self._folder = folder
 
     def open(self, name: str) -> BinaryIO:
         """Open the file of this name: one that another names must be a regular file beside it."""
@@ -84,6 +87,32 @@ class CacheFolder:
             raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 
 
+class StagedFolder(CacheFolder):
+    """Outputs that are written but not yet renamed, by their later names, with the other files of their folder."""
+
+    def __init__(self, staged: AtomicOutputs) -> None:
+        super().__init__(staged.folder, staged.names[-1])
+        self._files = staged.files
+
+    def open(self, name: str) -> BinaryIO:
+        """Open an output, or a file beside it."""
+        if name not in self._files:
+            return super().open(name)
+        self.sizes[name] = self._files[name].stat().st_size
+        return self._files[name].open("rb")
+
+    def names(self) -> Sequence[str]:
+        """Names of all files in the folder after the outputs are renamed."""
+        return sorted({*super().names(), *self._files})
+
+    def resolve(self, address: str) -> Bytes:
+        """Return the bytes of an output, or of a file beside or below it. Raises FormatError."""
+        if address not in self._files:
+            return resolver.open_relative(self._folder, address)
+        with self.open(address) as file:
+            return np.frombuffer(file.read(), np.uint8)
+
+
 def _received(stack: ExitStack) -> CacheFolder:
     """Stdin as a file in a temporary folder, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
@@ -94,7 +123,7 @@ def _received(stack: ExitStack) -> CacheFolder:
             file.writelines(iter(_read_block, b""))
     except OSError as error:
         raise not_written("the temporary file for stdin", error).advise("TMPDIR names another folder for it") from None
-    return CacheFolder(path)
+    return CacheFolder(path.parent, path.name)
 
 
 def _read_block() -> bytes:

@@ -15,11 +15,15 @@ from anim.files import resolver
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.io.buffers import Resolve
+from anim.gltf.io.source import open_bytes
 from anim.model import VertexCache
 from anim.show.page.page import PageFile
 from anim.show.page.sources import PageSource, convert_cache, read_curves
 from cli.io import cache_files, documents
+from cli.io.cache_folders import StagedFolder
 from cli.text import Reporter
+
+GLTF = (".glb", ".gltf")
 
 
 def open_page_file(path: str, reporter: Reporter) -> PageFile:
@@ -30,14 +34,26 @@ def open_page_file(path: str, reporter: Reporter) -> PageFile:
     if of_path(path) is not None:
         with documents.content(path, ending=suffix(path)) as (data, name):
             return _converted(read_curves(data.tobytes(), name=PurePath(name).name), name, len(data))
-    if suffix(path) in CACHE_FORMATS and suffix(path) not in (".glb", ".gltf"):
-        with cache_files.load(path, ReadOptions()) as loaded:
-            for words in loaded.notes:
-                reporter.warn(words)
-            return _of_cache(loaded.cache, loaded.name, loaded.size)
+    if suffix(path) in CACHE_FORMATS and suffix(path) not in GLTF:
+        return _read_cache(path, reporter)
     with documents.source(path, reporter) as source:
         beside = None if source.folder is None else resolver.CompanionFiles(source.folder).open
         return _of_document(source.document, source.name, source.size, beside)
+
+
+def open_staged_file(path: str, staged: StagedFolder, reporter: Reporter) -> PageFile:
+    """Return a written cache or bake for a page, before its files are renamed. path: its later name."""
+    if suffix(path) in GLTF:
+        source = open_bytes(staged.resolve(staged.main), path, resolve=staged.resolve)
+        return _of_document(source.document, source.name, source.size, staged.resolve)
+    return _read_cache(path, reporter, staged)
+
+
+def _read_cache(path: str, reporter: Reporter, staged: StagedFolder | None = None) -> PageFile:
+    with cache_files.load(path, ReadOptions(), staged=staged) as loaded:
+        for words in loaded.notes:
+            reporter.warn(words)
+        return _of_cache(loaded.cache, loaded.name, loaded.size)
 
 
 def _of_pipe(data: Bytes, name: str, reporter: Reporter) -> PageFile:

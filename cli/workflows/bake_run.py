@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -18,7 +19,8 @@ from anim.skinning.uneven import UnevenScale
 from cli import units
 from cli.errors import UsageError
 from cli.io import cache_files
-from cli.io.cache_files import SavedCache
+from cli.io.cache_files import CommitWith, SavedCache, commit_alone
+from cli.io.cache_folders import StagedFolder
 from cli.options import caches
 from cli.progress import Progress
 from cli.reports import bake_notes
@@ -56,13 +58,13 @@ class FileOptions:
             cache = vertex_order.reorder(cache, str(self.vertex_order))
         return cache if self.up is None else up_axis.to_up_axis(cache, str(self.up))
 
-    def save(self, cache: VertexCache, file: str, source: Mapping[str, Any]) -> SavedCache:
-        """Write a cache. source: the write option of formats that keep materials."""
+    def save(self, cache: VertexCache, file: str, source: Mapping[str, Any], commit_with: CommitWith) -> SavedCache:
+        """Write a cache, and other outputs as `cache_files.save`. source: the option of formats that keep materials."""
         error = None
         if self.max_error is not None:
             error = units.parse_length(self.max_error, "--max-error", lambda: statistics.diagonal(cache))
         options = caches.write_options(self.ending, {**self.values, "max_error": error, **source})
-        return cache_files.save(cache, file, options, ending=self.ending, dry_run=self.dry_run)
+        return cache_files.save(cache, file, options, ending=self.ending, dry_run=self.dry_run, commit_with=commit_with)
 
 
 class GroupBaker:
@@ -78,14 +80,23 @@ class GroupBaker:
 
 
 class BakeRun:
-    """Bakes clips into files one after another, and collects findings for the notes."""
+    """Bakes clips into files one after another, and collects findings for the notes.
+
+    commit_with: makes other outputs of the files.
+    """
 
     def __init__(
-        self, source: Source, scene: Scene, options: BakeOptions, file_options: FileOptions, reporter: Reporter
+        self,
+        source: Source,
+        scene: Scene,
+        options: BakeOptions,
+        file_options: FileOptions,
+        reporter: Reporter,
+        commit_with: CommitWith = commit_alone,
     ) -> None:
         self.files: list[BakedFile] = []
         self._source, self._scene, self._options = source, scene, options
-        self._file_options, self._reporter = file_options, reporter
+        self._file_options, self._reporter, self._commit_with = file_options, reporter, commit_with
         self._group: tuple[int, GroupBaker] | None = None
         self._inbetween: dict[tuple[int, int], InbetweenError] = {}  # by group and first equal clip
         self._inbetween_errors: list[tuple[str, InbetweenError]] = []
@@ -123,8 +134,13 @@ class BakeRun:
         cache = self._file_options.transform(baked)
         output = Output(job.file, self._file_options.ending, self._file_options.dry_run)
         source = group.sources.option(job.clip, clip, output)
+
+        def commit_with(staged: StagedFolder) -> AbstractContextManager[None]:
+            progress.close()  # whose bar is not for this
+            return self._commit_with(staged)
+
         try:
-            saved = self._file_options.save(cache, job.file, source)
+            saved = self._file_options.save(cache, job.file, source, commit_with)
         finally:
             progress.close()
         if measured is not None:

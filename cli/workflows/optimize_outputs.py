@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
@@ -81,13 +81,15 @@ def write_report(
 ) -> Iterator[None]:
     """Write the report around the block that writes the model: if one of them fails, neither file changes.
 
-    On stdout the report is written first, so that the model stays unchanged if the report can't be written.
+    On stdout the report is written first, so that the model stays unchanged if the report can't be written, and also
+    with `dry_run`, which else only makes it.
     """
-    if path is None or (dry_run and path != documents.PIPE):
+    if path is None:
         yield
         return
     warnings = [*reporter.warnings, *optimize_report.warnings(about)]
-    with documents.commit_text_after(optimize_json.as_json(about, warnings=warnings), path):
+    made = optimize_json.as_json(about, warnings=warnings)
+    with nullcontext() if dry_run and path != documents.PIPE else documents.commit_text_after(made, path):
         yield
 
 
@@ -114,7 +116,7 @@ def write_comparison(
     about: optimize_report.OptimizeReport, reporter: Reporter, html: str | None, input: str, *, dry_run: bool
 ) -> Iterator[None]:
     """Write the page that compares the model before and after around the block that writes the model."""
-    if html is None or dry_run:
+    if html is None:
         yield
         return
     from anim.show.page.page import page
@@ -127,5 +129,5 @@ def write_comparison(
     content = compare_files(before, after, reporter)
     content = replace(content, panels=(*size_panels(about), *content.panels))
     made = page(before, after, view=worst_view(before, content), content=content)
-    with commit_page_after(html, made, reporter):
+    with commit_page_after(html, made, reporter, dry_run=dry_run):
         yield

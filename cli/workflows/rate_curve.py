@@ -8,8 +8,6 @@ import math
 from collections.abc import Sequence
 from pathlib import PurePath
 
-import numpy as np
-
 from anim.errors import FormatError
 from anim.measure.inspect.storage_cost import animation_bytes
 from anim.optimization.file_optimizer import FileOptimizer
@@ -41,17 +39,18 @@ def write_curve(
     for point in curve(optimizer.scale, lambda max_error: optimizer.find_point(request, max_error), bounds):
         reporter.info(_line(point, optimizer.scale))
         points.append(point)
-    if dry_run:
-        return
-    kind = PurePath(path).suffix.lower()[1:]
-    if kind == "csv":
-        documents.write_text(_csv(points, optimizer.scale), path)
-    else:
-        from anim.show.plots.rate_distortion_plot import rate_distortion_plot
+    made = _render(points, optimizer, PurePath(name).name, PurePath(path).suffix.lower()[1:])
+    if not dry_run:
+        documents.write_text(made, path)
 
-        title, source = PurePath(name).name, animation_bytes(optimizer.document)
-        picture = rate_distortion_plot(points, optimizer.scale, title=title, kind=kind, source=source)
-        documents.write_bytes([np.frombuffer(picture, np.uint8)], path)
+
+def _render(points: Sequence[RatePoint], optimizer: FileOptimizer, title: str, kind: str) -> str | bytes:
+    if kind == "csv":
+        return _csv(points, optimizer.scale)
+    from anim.show.plots.rate_distortion_plot import rate_distortion_plot
+
+    source = animation_bytes(optimizer.document)
+    return rate_distortion_plot(points, optimizer.scale, title=title, kind=kind, source=source)
 
 
 def _line(point: RatePoint, scale: float) -> str:

@@ -48,7 +48,7 @@ def simulate_clip(
     if not dry_run:
         is_other = output != documents.PIPE and PurePath(output).suffix.lower() in others
         (documents.check_file if is_other else documents.check_output)(output)
-        check_report(report)
+    check_report(report)
     with documents.source(input, reporter) as source:
         scene = scenes.read_scene(source.document, source.name, reporter)
         index = driving_clip(source.document, clip)
@@ -59,7 +59,7 @@ def simulate_clip(
             if report is not None and error.report is not None and not dry_run:
                 write_report(error.report, report)
             raise
-        with commit_report_after(found, None if dry_run else report):
+        with commit_report_after(found, report, dry_run=dry_run):
             if isinstance(result, bytes):
                 size = len(result)
                 if not dry_run:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import PurePath
 
 from anim.show.plots.figure import FORMATS
@@ -32,12 +32,13 @@ def write_report(report: SimulationReport, path: str) -> None:
 
 
 @contextmanager
-def commit_report_after(report: SimulationReport, path: str | None) -> Iterator[None]:
-    """Write a report around the block that writes the output: if one of them fails, neither file changes."""
-    if path is None:
-        yield
-        return
-    with documents.commit_text_after(_render(report, path), path):
+def commit_report_after(report: SimulationReport, path: str | None, *, dry_run: bool) -> Iterator[None]:
+    """Write a report around the block that writes the output: if one of them fails, neither file changes.
+
+    dry_run: only make the report, so that its errors are known.
+    """
+    made = "" if path is None else _render(report, path)
+    with nullcontext() if path is None or dry_run else documents.commit_text_after(made, path):
         yield
 
 

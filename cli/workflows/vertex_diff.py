@@ -24,12 +24,11 @@ from cli.workflows import mesh_pairs, vertex_motion
 from cli.workflows.vertex_motion import VertexMotion, cache_motion, common_times, pair_documents, pair_with_cache
 
 GLTF = (".glb", ".gltf")
-Opened = Mapping[str, tuple[Document, int, Scene]]
 
 
 @dataclass(frozen=True, slots=True)
-class _Side:
-    """An input: its document or its cache."""
+class ComparedFile:
+    """A file: its document and scene, or its cache."""
 
     name: str
     size: int
@@ -43,6 +42,11 @@ class _Side:
         return self.scene
 
 
+def compare_document(name: str, size: int, document: Document, scene: Scene) -> ComparedFile:
+    """Return a glTF file for a comparison, a flip-book as a cache."""
+    return ComparedFile(name, size, document, mesh_pairs.pages_of(document), scene)
+
+
 def is_cache(path: str | None) -> bool:
     """Return whether a path has the file extension of a cache that is no glTF."""
     ending = PurePath(path or "").suffix.lower()
@@ -50,44 +54,51 @@ def is_cache(path: str | None) -> bool:
 
 
 def diff_by_vertex(
-    old: str, new: str, clips: Sequence[str], fps: float, reporter: Reporter, *, opened: Opened
+    old: str, new: str, clips: Sequence[str], fps: float, reporter: Reporter, *, opened: Mapping[str, ComparedFile]
 ) -> VertexReport:
     """Compare two files by vertex, at all keys and frames of both, half-way between, and at `fps` per second.
 
-    clips: globs for the clip of the glTF file; the cache's by name, or the only one. opened: documents that were read
-    already, with their sizes and scenes, by name.
+    clips: globs for the clip of the glTF file; the cache's by name, or the only one. opened: files that were read
+    already, by name.
     """
     with ExitStack() as stack:
-        one, other = (stack.enter_context(_opened(path, reporter, opened)) for path in (old, new))
-        label, first, second = _motions(one, other, clips, reporter)
-        try:
-            times = common_times(first, second, fps)
-        except AnimError as error:
-            raise error.at(one.name, ": ") from None
-        found = vertex_distance(times, first.frames(times), second.frames(times), diagonal=first.diagonal())
-        mesh, vertex = vertex_motion.locate(first if first.labels else second, max(found.vertex, 0))
-        return VertexReport((one.name, other.name), (one.size, other.size), label, found, mesh, vertex, fps)
+        one, other = (
+            opened.get(documents.called(path)) or stack.enter_context(open_compared(path, reporter))
+            for path in (old, new)
+        )
+        return diff_opened(one, other, clips, fps, reporter)
+
+
+def diff_opened(
+    one: ComparedFile, other: ComparedFile, clips: Sequence[str], fps: float, reporter: Reporter
+) -> VertexReport:
+    """Compare two files by vertex, like `diff_by_vertex`."""
+    label, first, second = _motions(one, other, clips, reporter)
+    try:
+        times = common_times(first, second, fps)
+    except AnimError as error:
+        raise error.at(one.name, ": ") from None
+    found = vertex_distance(times, first.frames(times), second.frames(times), diagonal=first.diagonal())
+    mesh, vertex = vertex_motion.locate(first if first.labels else second, max(found.vertex, 0))
+    return VertexReport((one.name, other.name), (one.size, other.size), label, found, mesh, vertex, fps)
 
 
 @contextmanager
-def _opened(path: str, reporter: Reporter, opened: Opened) -> Iterator[_Side]:
+def open_compared(path: str, reporter: Reporter) -> Iterator[ComparedFile]:
+    """Give the file at `path`; errors raised inside name it."""
     if is_cache(path):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
                 reporter.warn(words)
-            yield _Side(loaded.name, loaded.size, None, loaded.cache)
-    elif documents.called(path) in opened:
-        document, size, scene = opened[documents.called(path)]
-        yield _Side(documents.called(path), size, document, mesh_pairs.pages_of(document), scene)
+            yield ComparedFile(loaded.name, loaded.size, None, loaded.cache)
     else:
         with documents.source(path, reporter) as source:
-            cache = mesh_pairs.pages_of(source.document)
             scene = scenes.read_scene(source.document, source.name, reporter)
-            yield _Side(source.name, source.size, source.document, cache, scene)
+            yield compare_document(source.name, source.size, source.document, scene)
 
 
 def _motions(
-    one: _Side, other: _Side, globs: Sequence[str], reporter: Reporter
+    one: ComparedFile, other: ComparedFile, globs: Sequence[str], reporter: Reporter
 ) -> tuple[str, VertexMotion, VertexMotion]:
     """Name of the clip, and both motions."""
     if one.cache is not None and other.cache is not None:
@@ -111,7 +122,10 @@ def _motions(
 
 
 def _of_documents(
-    source: tuple[_Side, Document], baked: tuple[_Side, Document], globs: Sequence[str], reporter: Reporter
+    source: tuple[ComparedFile, Document],
+    baked: tuple[ComparedFile, Document],
+    globs: Sequence[str],
+    reporter: Reporter,
 ) -> tuple[str, VertexMotion, VertexMotion]:
     """Name of the clip, and the motions of a source and of its bake, which has one clip."""
     (played,) = reader.clips(baked[1])[:1] or (Clip("", ()),)
@@ -124,7 +138,7 @@ def _of_documents(
     return clip.name, first, second
 
 
-def _clip(side: _Side, document: Document, globs: Sequence[str]) -> Clip:
+def _clip(side: ComparedFile, document: Document, globs: Sequence[str]) -> Clip:
     """The selected clip of a document, or its only one."""
     clips = reader.clips(document)
     chosen = Selection(globs).chosen_clips(reader.names(document)) if globs else range(len(clips))

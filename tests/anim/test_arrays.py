@@ -108,3 +108,8 @@ def test_later_writes_through_the_array_of_a_view_change_nothing(gate: Any) -> N
 def test_what_is_read_only_already_is_shared() -> None:
     mine = arrays.freeze(np.arange(3.0))
     assert arrays.as_floats(mine, "K") is mine
+
+
+def test_indices_are_grouped_in_the_order_of_first_keys() -> None:
+    assert list(arrays.group_indices("bcab").items()) == [("b", [0, 3]), ("c", [1]), ("a", [2])]
+    assert arrays.group_indices([]) == {}

@@ -22,6 +22,15 @@ def test_a_number_beyond_float64_is_refused() -> None:
     assert parse_length("1e300mm", "max_error", lambda: 1.0) == pytest.approx(1e297)
 
 
+def test_fractions_have_a_limit() -> None:
+    assert parse_length("1e8%", "max_error", lambda: 2.0) == 2e6
+    assert parse_fraction("1e6", "tolerance") == 1e6
+    with pytest.raises(RangeError, match=r"^max_error is '1e308%' \(expected at most 1e\+08%\)$"):
+        parse_length("1e308%", "max_error", lambda: 2.0)
+    with pytest.raises(RangeError, match=r"^tolerance is '1\.1e6' \(expected at most 1e\+08%\)$"):
+        parse_fraction("1.1e6", "tolerance")
+
+
 def test_a_count_has_its_noun_in_the_singular_or_plural() -> None:
     assert [plural(count, "clip") for count in (0, 1, 2)] == ["0 clips", "1 clip", "2 clips"]
     assert [plural(count, "vertex", "vertices") for count in (1, 2)] == ["1 vertex", "2 vertices"]

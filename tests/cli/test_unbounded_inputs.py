@@ -14,7 +14,7 @@ from anim.caches.child_process import ChildEndedError
 from anim.caches.formats import usd_reader
 from anim.errors import NotFoundError
 from anim.exchange.retarget import retarget
-from tests.cli.conftest import Call
+from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, refusal
 from tests.fixtures.reading import split
 from tests.fuzz.simulation_seeds import pack
@@ -124,6 +124,22 @@ def test_a_model_without_a_size_for_particles(call: Call, tmp_path: Path) -> Non
     run = call(*line)
     assert "--size is 0.5% of the model, whose diagonal is 0 m (expected " in refusal(run, 3)
     assert "choose --size" in run.err
+
+
+@pytest.mark.parametrize("size", ["1e308%", "1e-40%", "1e31", "1e-31m"])
+def test_sizes_of_particles_that_an_option_is_to_blame_for(size: str, fixture: Fixture, call: Call) -> None:
+    run = call("simulate", "particles", fixture("arm"), "-", "--node", "#0", "--clip", "#0", "--size", size)
+    assert "--size is " in refusal(run, 2)
+
+
+def test_a_tolerance_of_easings_that_exceeds_all_numbers(call: Call, tmp_path: Path) -> None:
+    """Times the range of 90 m; the clip was to blame for it."""
+    joint = "ROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nEnd Site\n{\nOFFSET 0 1 0\n}\n}"
+    (tmp_path / "in.bvh").write_text(f"HIERARCHY\n{joint}\nMOTION\nFrames: 2\nFrame Time: 1\n0 0 0\n9000 0 0\n")
+    call("from-euler", tmp_path / "in.bvh", tmp_path / "in.glb").product()
+    line = ("ease", tmp_path / "in.glb", tmp_path / "out.glb", "--per", "range", "--tolerance")
+    assert "--tolerance is '1e308' (expected at most " in refusal(call(*line, "1e308"), 2)
+    call(*line, "1e6").product()
 
 
 def test_springs_of_a_file_without_a_clip_need_a_duration(call: Call, tmp_path: Path) -> None:

@@ -235,6 +235,6 @@ def _read(name: str, *, is_copy: bool) -> None:
     elif ending == ".json":
         json.loads(Path(name).read_bytes(), parse_constant=_refuse)
     elif ending in (".npz", ".pc2", ".mdd"):
-        cache = registry.reader_for(ending)(CacheFolder(Path(name)), ReadOptions())
+        cache = registry.reader_for(ending)(CacheFolder(Path(), name), ReadOptions())
         for _ in cache.chunks():
             pass

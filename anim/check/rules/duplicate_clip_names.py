@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from anim.arrays import group_indices
 from anim.check.checked_file import CheckedFile
 from anim.check.edits import free_name, rename_clips
 from anim.check.finding import Occurrence, Severity
@@ -13,9 +14,7 @@ from anim.gltf.document import Document, json_array
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield one occurrence per name."""
-    by_name: dict[str, list[int]] = {}
-    for i, animation in enumerate(json_array(file.json, "animations")):
-        by_name.setdefault(animation.get("name", ""), []).append(i)
+    by_name = group_indices(each.get("name", "") for each in json_array(file.json, "animations"))
     for name, numbers in by_name.items():
         if name and len(numbers) > 1:
             problem = f"{len(numbers)} clips have this name (numbers {', '.join(map(str, numbers))})"

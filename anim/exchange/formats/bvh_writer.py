@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, group_indices
 from anim.errors import UnsupportedError
 from anim.exchange.euler.curve import Curve, evaluate
 from anim.exchange.euler.motion import NO_PIVOTS, EulerMotion, EulerNode
@@ -61,9 +61,7 @@ def write(motion: EulerMotion) -> bytes:
     # Encoded while it is written: of the whole there is one copy. A lone surrogate is valid in JSON names.
     text = io.TextIOWrapper(data, "utf-8", "backslashreplace", newline="\n")
     text.write("HIERARCHY\n")
-    children: dict[int, list[int]] = {}
-    for number, node in enumerate(motion.nodes):
-        children.setdefault(node.parent, []).append(number)
+    children = group_indices(node.parent for node in motion.nodes)
     offsets = list(_format_vectors(np.array([node.translation for node in motion.nodes])))
     waiting: list[tuple[int, int]] = [(root, 0) for root in reversed(children.get(-1, []))]
     while waiting:  # iterative: a rope may have more joints in sequence than Python's recursion limit

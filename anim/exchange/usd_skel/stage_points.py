@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Floats, Ints, group_indices
 from anim.exchange.usd_skel.stage_parts import BlendedMesh, PlainMeshes, SkinnedMeshes, StagePart
 from anim.exchange.usd_skel.varying_prims import VaryingPrims
 
@@ -63,9 +63,7 @@ class _Skinning(NamedTuple):
 def _parts(stage: Any, meshes: Sequence[Any]) -> Iterator[tuple[list[int], StagePart, bool]]:
     """Indices of meshes, their part, and whether it moves."""
     varying, skinning = VaryingPrims(), _skinning(stage, meshes)
-    groups: dict[tuple[object, ...], list[int]] = {}
-    for number, each in enumerate(skinning):
-        groups.setdefault(each.key(number, varying), []).append(number)
+    groups = group_indices(each.key(number, varying) for number, each in enumerate(skinning))
     for (is_placed, moves, *_), numbers in groups.items():
         some = [skinning[number] for number in numbers]
         yield numbers, _part(some, is_placed=bool(is_placed)), bool(is_placed or moves)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from anim.arrays import group_indices
 from anim.gltf.document import Json
 from anim.gltf.io import json_text
 from anim.gltf.meshopt import codec, stream_order
@@ -74,10 +75,9 @@ def lay_out_views(contents: Sequence[AccessorData], extension: str, overhead: in
 
 def _choose_streams(contents: Sequence[AccessorData], extension: str, overhead: int) -> list[_Stream]:
     """The compressed streams that give the fewest bytes of data and JSON in total."""
-    groups: dict[tuple[str, int], list[int]] = {}
-    for i, content in enumerate(contents):
-        groups.setdefault(_kind(content), []).append(i)
-    streams = [s for members in groups.values() for s in _streams(contents, members, extension)]
+    streams = [
+        s for members in group_indices(map(_kind, contents)).values() for s in _streams(contents, members, extension)
+    ]
     gains = [stream.view.length - _price(stream.view, extension) for stream in streams]
     good = [stream for stream, gain in zip(streams, gains, strict=True) if gain > 0]
     # If nothing remains for the plain view, its JSON is saved too.

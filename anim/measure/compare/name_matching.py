@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from anim.arrays import Ints
+from anim.arrays import Ints, group_indices
 from anim.model import Scene, Skeleton
 
 
@@ -97,7 +97,7 @@ class _Nodes:
 
     def __init__(self, old: Skeleton, new: Skeleton) -> None:
         self._old, self._new = old, new
-        self._children = _children(old), _children(new)
+        self._children = tuple(group_indices(each.parents.tolist()) for each in (old, new))
         self.found: list[int] = match_by_letters(old.names, new.names).tolist()
         self._match_paths()
         self._taken = {node for node in self.found if node >= 0}
@@ -148,13 +148,6 @@ class _Nodes:
             if is_free and (self._renamed or not self._old.names[one] or not self._new.names[other]):
                 self.found[one] = other
                 self._taken.add(other)
-
-
-def _children(skeleton: Skeleton) -> dict[int, list[int]]:
-    result: dict[int, list[int]] = {}
-    for node, parent in enumerate(skeleton.parents.tolist()):
-        result.setdefault(parent, []).append(node)
-    return result
 
 
 def _path_ids(skeleton: Skeleton, known: dict[tuple[int, str], int]) -> list[int]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Floats
+from anim.arrays import Floats, group_indices
 from anim.errors import RangeError
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.divided_ranges import measure_on_parts
@@ -203,11 +203,8 @@ def _by_length(
     measure: Callable[[Sequence[LoopRange], Floats], Floats], parts: Sequence[LoopRange], times: Sequence[Floats]
 ) -> list[Floats]:
     """Values at times (..., F) of each range, measured together for ranges with the same number of times."""
-    groups: dict[int, list[int]] = {}
-    for i, each in enumerate(times):
-        groups.setdefault(each.shape[-1], []).append(i)
     found = [np.zeros(0)] * len(parts)
-    for length, group in groups.items():
+    for length, group in group_indices(each.shape[-1] for each in times).items():
         if length:
             rows = measure([parts[i] for i in group], np.stack([times[i] for i in group]))
             for i, row in zip(group, rows, strict=True):

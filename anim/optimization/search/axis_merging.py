@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Bools, Floats, Ints, group_indices
 
 MAX_STACKED_PAIRS = 1_000_000  # of groups of tracks whose axes are merged at once
 
@@ -44,10 +44,7 @@ class _Groups:
     """The tracks of a clip in groups of equal keys. keys: (G', K). width: (G',) bytes of one key of a group."""
 
     def __init__(self, keep: Bools, key_bytes: Floats) -> None:
-        groups: dict[bytes, list[int]] = {}
-        for i, row in enumerate(keep):
-            groups.setdefault(row.tobytes(), []).append(i)
-        self.members = list(groups.values())
+        self.members = list(group_indices(row.tobytes() for row in keep).values())
         self.keys = keep[[each[0] for each in self.members]]
         self.width = np.array([key_bytes[each].sum() for each in self.members])
 

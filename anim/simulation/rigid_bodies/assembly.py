@@ -45,20 +45,20 @@ def assemble(
     owned = _colliders_by_owner(description, skeleton)
     positions, rotations, _, _ = matrix.decompose(world)
     frames = [Frame(*each) for each in zip(positions, rotations, strict=True)]
-    bodies, shapes, extents = [], ScaledShapes(), ShapeExtents()
+    bodies, assembly = [], _Assembly(description, skeleton, world, frames)
     for node, motion in description.motions.items():
         own = owned.get(node, [])
         kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
         kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
-        bodies.append(_body(node, kind, motion, own, description, skeleton, frames, world, shapes, extents))
+        bodies.append(assembly.body(node, kind, motion, own))
     for node in owned.get(-1, []):
         kind = BodyKind.ANIMATED if is_tracked[node] else BodyKind.STATIC
-        bodies.append(_body(node, kind, REST, [node], description, skeleton, frames, world, shapes, extents))
+        bodies.append(assembly.body(node, kind, REST, [node]))
     indices = {body.node: i for i, body in enumerate(bodies)}
     joints = tuple(_joints(description, skeleton, indices, frames))
     if description.floor is not None:
         bodies.append(_floor(description))
-    return RigidScene(tuple(bodies), joints, gravity, extents)
+    return RigidScene(tuple(bodies), joints, gravity, assembly.extents)
 
 
 def _colliders_by_owner(description: PhysicsDescription, skeleton: Skeleton) -> dict[int, list[int]]:
@@ -85,40 +85,39 @@ def relative_frame(outer: Frame, inner: Frame) -> Frame:
     return Frame(quaternion.rotate(back, inner.position - outer.position), quaternion.multiply(back, inner.rotation))
 
 
-def _body(
-    node: int,
-    kind: BodyKind,
-    motion: Motion,
-    colliders: Sequence[int],
-    description: PhysicsDescription,
-    skeleton: Skeleton,
-    frames: Sequence[Frame],
-    world: Floats,
-    shapes: ScaledShapes,
-    extents: ShapeExtents,
-) -> RigidBody:
-    made, frame = [], frames[node]
-    for each in colliders:
-        try:
-            made += _collider(each, description.colliders[each], frame, frames[each], world[each], shapes)
-        except AnimError as error:
-            raise error.at(skeleton.label(each)) from None
-    reach = [float(np.linalg.norm(each.frame.position)) + extents.of(each.shape).reach for each in made]
-    spin = quaternion.rotate(frame.rotation, np.array(motion.angular_velocity))
-    velocity: Floats = np.array(motion.linear_velocity)
-    velocity = velocity if motion.velocity_in_world else quaternion.rotate(frame.rotation, velocity)
-    return RigidBody(node, kind, frame, tuple(made), motion, velocity, spin, max(reach, default=0.0))
+class _Assembly:
+    """Parts of bodies, whose shapes and extents are shared by all. frames, world: of nodes at the start."""
 
+    def __init__(
+        self, description: PhysicsDescription, skeleton: Skeleton, world: Floats, frames: Sequence[Frame]
+    ) -> None:
+        self.extents = ShapeExtents()
+        self._shapes = ScaledShapes()
+        self._description, self._skeleton = description, skeleton
+        self._world, self._frames = world, frames
 
-def _collider(
-    node: int, collider: Collider, body: Frame, own: Frame, world: Floats, shapes: ScaledShapes
-) -> list[BodyCollider]:
-    """One collider in its body's frame; none for a scale of 0, which disables it."""
-    linear = quaternion.to_matrix(quaternion.conjugate(own.rotation)) @ world[:, :3]
-    if not np.linalg.norm(linear, axis=0).any():
-        return []
-    shape = shapes.scale(collider.shape, linear)
-    return [BodyCollider(node, shape, relative_frame(body, own), collider.material, collider.filter)]
+    def body(self, node: int, kind: BodyKind, motion: Motion, colliders: Sequence[int]) -> RigidBody:
+        """Return the body of a node. colliders: nodes of those that it owns."""
+        made, frame = [], self._frames[node]
+        for each in colliders:
+            try:
+                made += self._collider(each, frame)
+            except AnimError as error:
+                raise error.at(self._skeleton.label(each)) from None
+        reach = [float(np.linalg.norm(each.frame.position)) + self.extents.of(each.shape).reach for each in made]
+        spin = quaternion.rotate(frame.rotation, np.array(motion.angular_velocity))
+        velocity: Floats = np.array(motion.linear_velocity)
+        velocity = velocity if motion.velocity_in_world else quaternion.rotate(frame.rotation, velocity)
+        return RigidBody(node, kind, frame, tuple(made), motion, velocity, spin, max(reach, default=0.0))
+
+    def _collider(self, node: int, body: Frame) -> list[BodyCollider]:
+        """One collider in its body's frame; none for a scale of 0, which disables it."""
+        collider, own = self._description.colliders[node], self._frames[node]
+        linear = quaternion.to_matrix(quaternion.conjugate(own.rotation)) @ self._world[node][:, :3]
+        if not np.linalg.norm(linear, axis=0).any():
+            return []
+        shape = self._shapes.scale(collider.shape, linear)
+        return [BodyCollider(node, shape, relative_frame(body, own), collider.material, collider.filter)]
 
 
 def _joints(

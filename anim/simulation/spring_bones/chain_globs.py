@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from anim.arrays import group_indices
 from anim.errors import NotFoundError
 from anim.model import Skeleton
 from anim.operations.selection import match_names
@@ -36,7 +37,7 @@ def find_chains(
     below = np.zeros(len(skeleton), np.bool_)
     for node in matched:
         below |= skeleton.descendants(node) & (np.arange(len(skeleton)) != node)
-    children = _children(skeleton)
+    children = group_indices(skeleton.parents.tolist())
     chains = []
     for root in (node for node in matched if not below[node]):
         allowed = frozenset(skin_joints) if root in skin_joints else None
@@ -96,13 +97,6 @@ def _vector(skeleton: Skeleton, node: int) -> Vector:
     """The node's own offset from its parent, in its own space."""
     x, y, z = skeleton.translation[node].tolist()
     return x, y, z
-
-
-def _children(skeleton: Skeleton) -> dict[int, list[int]]:
-    children: dict[int, list[int]] = {}
-    for node, parent in enumerate(skeleton.parents.tolist()):
-        children.setdefault(parent, []).append(node)
-    return children
 
 
 def _length(skeleton: Skeleton, joint: SpringJoint) -> float:

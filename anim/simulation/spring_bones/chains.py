@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,6 +16,14 @@ DEFAULT_DAMPING_RATIO = 0.5  # one visible overshoot; less resonates from joint 
 MAX_FORCE = 1e6  # of stiffness and gravity; far above what can be seen, far below what overflows
 MIN_FREQUENCY_HZ, MAX_FREQUENCY_HZ = 1e-3, 1e6
 MAX_DAMPING_RATIO = 1e6
+RANGES = {  # of the fields of `SpringParameters`, of gravity by component
+    "stiffness": (0.0, MAX_FORCE),
+    "drag": (0.0, 1.0),
+    "gravity": (0.0, MAX_FORCE),
+    "hit_radius": (0.0, math.inf),
+    "frequency": (MIN_FREQUENCY_HZ, MAX_FREQUENCY_HZ),
+    "damping_ratio": (0.0, MAX_DAMPING_RATIO),
+}
 DOWN: Vector = (0.0, -1.0, 0.0)
 
 
@@ -38,16 +47,19 @@ class SpringParameters:
     damping_ratio: float = DEFAULT_DAMPING_RATIO
 
     def __post_init__(self) -> None:
-        check_quantity(self.stiffness, "stiffness", least=0.0, most=MAX_FORCE)
-        check_quantity(self.drag, "drag", least=0.0, most=1.0)
+        for name in RANGES:
+            if name != "frequency" or self.frequency is not None:
+                check_parameter(name, getattr(self, name), name.replace("_", " "))
         object.__setattr__(self, "gravity", check_vector(self.gravity, "gravity"))
-        check_quantity(max(map(abs, self.gravity)), "gravity", least=0.0, most=MAX_FORCE)
-        check_quantity(self.hit_radius, "hit radius", least=0.0)
-        check_quantity(self.damping_ratio, "damping ratio", least=0.0, most=MAX_DAMPING_RATIO)
         for name in ("stiffness", "drag", "hit_radius", "damping_ratio"):
             object.__setattr__(self, name, float(getattr(self, name)))  # numpy has no type for the integers of JSON
-        if self.frequency is not None:
-            check_quantity(self.frequency, "frequency", least=MIN_FREQUENCY_HZ, most=MAX_FREQUENCY_HZ)
+
+
+def check_parameter(name: str, value: Any, label: str) -> None:
+    """Raise RangeError unless `value` is in the range of a field of `SpringParameters`. label: for the message."""
+    least, most = RANGES[name]
+    number = max(map(abs, check_vector(value, label))) if name == "gravity" else value
+    check_quantity(number, label, least=least, most=most)
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,8 +73,12 @@ class MeasuredBake:
 
 def max_distance(positions: AnyArray, others: AnyArray) -> Floats:
     """Return the largest distance (F,) in each frame between positions and others (F, V, 3)."""
-    apart = positions - others
-    return np.asarray(np.sqrt(np.einsum("fvi,fvi->fv", apart, apart).max(axis=1, initial=0.0)), float)
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = positions - others
+        squares = np.einsum("fvi,fvi->fv", apart, apart).max(axis=1, initial=0.0)
+    if not np.isfinite(squares).all() and positions.dtype != np.float64:  # float32 has no squares of 1e20 m
+        return max_distance(positions.astype(np.float64), others.astype(np.float64))
+    return np.asarray(np.sqrt(squares), float)
 
 
 def model_size(made: Baker) -> float:

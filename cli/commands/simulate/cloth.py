@@ -194,7 +194,7 @@ def command(
         cache, given["source"] = onto_source(
             _as_part(cache, scene, node), source, number, output=Output(output, ending, dry_run)
         )
-    with commit_report_after(run.report, None if dry_run else report):
+    with commit_report_after(run.report, report, dry_run=dry_run):
         saved = cache_files.save(
             cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
         )

@@ -268,17 +268,19 @@ def _summary(report: SimulationReport, *, has_nodes: bool = True) -> str:
 def _radius(size: str, scene: Scene) -> float:
     """Radius of a particle in m.
 
-    Raises UsageError for one that no file can have, and for such a share of a model of 1 m; DataRangeError where that
-    is the model's fault: without a size, or beyond all numbers.
+    Raises UsageError for one that no file can have, DataRangeError where that is the model's fault: without a size, or
+    beyond all numbers.
     """
-    if not MIN_SIZE_M <= units.parse_length(size, "--size", lambda: 1.0) <= MAX_SIZE_M:
-        raise UsageError(f"--size is '{size}' (expected {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m)")
-    radius = units.parse_length(size, "--size", lambda: diagonal(scene))
-    if not MIN_SIZE_M <= radius <= MAX_SIZE_M:
-        about = f"{size} of the model, whose diagonal is {diagonal(scene):.3g} m"
-        problem = f"--size is {about} (expected {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m)"
-        raise DataRangeError(problem, help="choose --size, such as 2cm")
-    return radius
+    whole = diagonal(scene)
+    radius = units.parse_length(size, "--size", lambda: whole)
+    if MIN_SIZE_M <= radius <= MAX_SIZE_M:
+        return radius
+    expected = f"(expected {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m)"
+    if not size.rstrip().endswith("%"):
+        raise UsageError(f"--size is '{size}' {expected}")
+    problem = f"--size is {size} of the model, whose diagonal is {whole:.3g} m {expected}"
+    error = UsageError if MIN_SIZE_M <= whole <= MAX_SIZE_M else DataRangeError
+    raise error(problem, help="choose --size, such as 2cm")
 
 
 def _rigid_colliders(document: Document, scene: Scene, reporter: Reporter) -> list[Obstacle]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Any
 
 import typer
 
 from anim.arrays import Floats
-from anim.errors import RangeError, UnstableError
+from anim.errors import UnstableError
 from anim.gltf.authoring import add_clips
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -22,7 +22,7 @@ from anim.operations.selection import Selection
 from anim.simulation.registry import SIMULATIONS
 from anim.simulation.report import SimulationReport
 from anim.simulation.spring_bones.chain_globs import find_chains
-from anim.simulation.spring_bones.chains import SpringBones, SpringParameters
+from anim.simulation.spring_bones.chains import SpringBones, SpringParameters, check_parameter
 from anim.simulation.spring_bones.colliders import Vector
 from anim.simulation.spring_bones.json_reader import read_spring_file
 from anim.simulation.spring_bones.penetration import deepest_penetration
@@ -137,7 +137,8 @@ def command(
     changes: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     if gravity is not None:
         changes["gravity"] = _gravity(gravity)
-    _check_parameters(changes)
+    for name, value in changes.items():  # before the file is read, and by the options' names
+        check_parameter(name, value, f"--{name.replace('_', '-')}")
 
     def simulate(
         document: Document, scene: Scene, driver: Clip, number: int | None
@@ -203,16 +204,6 @@ def _center(skeleton: Skeleton, glob: str | None) -> int | None:
     if len(found) > 1:
         raise UsageError(f"--center '{glob}' matches {len(found)} nodes (expected one)")
     return found[0]
-
-
-def _check_parameters(changes: Mapping[str, Any]) -> None:
-    """Raise UsageError, with the option's name, for a parameter out of range; those of files have their place there."""
-    for name, value in changes.items():
-        try:
-            SpringParameters(**{name: value})
-        except RangeError as error:
-            problem = error.problem.removeprefix(name.replace("_", " "))
-            raise UsageError(f"--{name.replace('_', '-')}{problem}") from None
 
 
 def _gravity(given: str) -> Vector:

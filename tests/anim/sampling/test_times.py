@@ -61,6 +61,11 @@ def test_a_rate_is_a_number_above_0(fps: float) -> None:
         frame_times(0, 1, fps=fps)
 
 
+def test_more_frames_than_any_number_are_no_infinity() -> None:
+    with pytest.raises(UnsupportedError, match=r"^over 1e\+308 frames at 1e\+308 fps \(limit 10000000\)"):
+        frame_times(0, 10, fps=1e308)
+
+
 def test_too_many_frames_are_refused_at_once() -> None:
     with pytest.raises(UnsupportedError, match="limit"):
         frame_times(0, 1, fps=MAX_FRAMES + 1)

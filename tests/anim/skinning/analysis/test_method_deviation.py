@@ -41,6 +41,14 @@ def test_every_frame_is_looked_at() -> None:
     assert found.time == times[617]
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e20, 3e38])
+def test_the_largest_distance_of_large_coordinates_is_finite(scale: float) -> None:
+    """float32 has no square of 1e20 m, nor the difference of two numbers near its end: `bake` warned of inf m."""
+    positions = np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 0]]], np.float32) * np.float32(scale)
+    found = max_distance(positions, -positions)
+    np.testing.assert_allclose(found, [2 * scale, 0], rtol=1e-6)
+
+
 def test_linear_blending_is_not_off_itself() -> None:
     of, played = torn()
     made = prepare_bake(of)
