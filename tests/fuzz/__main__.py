@@ -24,6 +24,7 @@ import warnings
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -53,10 +54,11 @@ def main() -> int:
     if given.replay:
         return replay(given.replay)
     end = time.monotonic() + given.seconds
-    for name, batch in chosen_batches(given):
-        if time.monotonic() > end:
-            break
-        run_batch(name, batch, faults, done, given.keep)
+    with suppress(KeyboardInterrupt):  # what was done until then counts
+        for name, batch in chosen_batches(given):
+            if time.monotonic() > end:
+                break
+            run_batch(name, batch, faults, done, given.keep)
     print(f"{dict(done)} runs, {sum(faults.values())} faults of {len(faults)} kinds")  # noqa: T201
     return int(bool(faults))
 
