@@ -67,6 +67,8 @@ def compression(view: Json) -> Json | None:
 
 def _check_view(view: Json, buffers: list[Json]) -> None:
     _check_range(view, view["byteLength"], buffers[view["buffer"]]["byteLength"])
+    if "byteStride" not in view and "extensions" not in view:
+        return
     stride = view.get("byteStride")
     if stride is not None and not (stride <= 252 and stride % 4 == 0) and compression(view) is None:
         raise FormatError(f"is {stride} (expected 4 to 252, a multiple of 4)", where="byteStride")
@@ -120,10 +122,14 @@ def _check_accessor(accessor: Json, views: list[Json]) -> None:
         _check_sparse(accessor["sparse"], size, count, views)
 
 
+@cache
+def _alignment(component_type: int, kind: str) -> int:
+    unit = COMPONENT_SIZES[component_type]
+    return max(unit, 4) if kind in ("MAT2", "MAT3", "MAT4") else unit
+
+
 def _check_aligned(accessor: Json, view: Json) -> None:
-    unit = COMPONENT_SIZES[accessor["componentType"]]
-    if accessor["type"] in ("MAT2", "MAT3", "MAT4"):
-        unit = max(unit, 4)
+    unit = _alignment(accessor["componentType"], accessor["type"])
     offset = accessor.get("byteOffset", 0)
     if offset % unit:
         raise FormatError(f"is {offset} (expected a multiple of {unit})", where="byteOffset")

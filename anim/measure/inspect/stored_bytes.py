@@ -27,10 +27,10 @@ def stored_bytes(document: Document) -> int:
 
 def _bytes_in(view: Json, parts: list[byte_ranges.Range]) -> int:
     """Bytes of these parts of a view; of a compressed one all of its bytes as stored."""
-    found = buffer_layout.compression(view)
+    found = buffer_layout.compression(view) if "extensions" in view else None
     if found is not None:
         return int(found["byteLength"])
-    return sum(end - start for start, end in (byte_ranges.union(parts) if len(parts) > 1 else parts))
+    return sum([end - start for start, end in (byte_ranges.union(parts) if len(parts) > 1 else parts)])
 
 
 def _span(accessor: Json) -> byte_ranges.Range:
