@@ -19,7 +19,7 @@ DRACO = "KHR_draco_mesh_compression"
 def check(json: Json) -> None:
     """Raise FormatError at the first view or accessor that exceeds its bounds or is misaligned."""
     buffers, views = json_array(json, "buffers"), json_array(json, "bufferViews")
-    for i, view in enumerate(views):
+    for i, view in enumerate([] if _are_plain(views, buffers) else views):
         try:
             _check_view(view, buffers)
         except FormatError as error:
@@ -65,10 +65,16 @@ def compression(view: Json) -> Json | None:
     return None
 
 
+def _are_plain(views: list[Json], buffers: list[Json]) -> bool:
+    """Return True if all views are within their buffers and have nothing else to check, as in most files."""
+    lengths = [buffer["byteLength"] for buffer in buffers]
+    if any(view.get("byteOffset", 0) + view["byteLength"] > lengths[view["buffer"]] for view in views):
+        return False
+    return not any("byteStride" in view or "extensions" in view for view in views)
+
+
 def _check_view(view: Json, buffers: list[Json]) -> None:
     _check_range(view, view["byteLength"], buffers[view["buffer"]]["byteLength"])
-    if "byteStride" not in view and "extensions" not in view:
-        return
     stride = view.get("byteStride")
     if stride is not None and not (stride <= 252 and stride % 4 == 0) and compression(view) is None:
         raise FormatError(f"is {stride} (expected 4 to 252, a multiple of 4)", where="byteStride")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+import operator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain
 from typing import Any, NamedTuple, TypeAlias
 
@@ -66,9 +67,14 @@ def named_accessors(json: Json, skipped: Collection[int] = ()) -> set[int]:
     """Return the accessors of meshes, skins, known extensions and animations but those `skipped`."""
     found = set(_of_meshes(json)) | set(_of_skins(json)) | set(_of_instancing(json))
     for i, animation in enumerate(json_array(json, "animations")):
-        for sampler in animation["samplers"] if i not in skipped else ():
-            found |= {sampler["input"], sampler["output"]}
+        if i not in skipped:
+            found |= sampled_accessors(animation["samplers"])
     return found
+
+
+def sampled_accessors(samplers: Sequence[Json]) -> set[int]:
+    """Return the accessors of samplers: of their key times and values."""
+    return {*map(operator.itemgetter("input"), samplers), *map(operator.itemgetter("output"), samplers)}
 
 
 def unknown_indices(json: Json) -> set[int]:
@@ -82,11 +88,10 @@ def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
     As JSON pointers: ["/nodes/3/extensions/ACME_path"]. Those bytes are kept.
     """
     accessors, samplers = json_array(json, "accessors"), json_array(json, "animations")
-    keys = {s[k] for i in animations for s in samplers[i]["samplers"] for k in ("input", "output")}
-    named = keys | {view for number in keys for view in views_of(accessors[number])}
-    buffers = {
-        json_array(json, "bufferViews")[view]["buffer"] for number in keys for view in views_of(accessors[number])
-    }
+    keys = {key for i in animations for key in sampled_accessors(samplers[i]["samplers"])}
+    of_keys = views_of_all(accessors[number] for number in keys)
+    named = keys | of_keys
+    buffers = {json_array(json, "bufferViews")[view]["buffer"] for view in of_keys}
     return [
         place
         for place, part in unknown_extensions(json)
@@ -101,6 +106,14 @@ def views_of(accessor: Json) -> list[int]:
     if "sparse" in accessor:
         views += [accessor["sparse"][part]["bufferView"] for part in ("indices", "values")]
     return views
+
+
+def views_of_all(accessors: Iterable[Json]) -> set[int]:
+    """Return the views of all of these accessors: few have a sparse part."""
+    described = list(accessors)
+    sparse = [about for about in described if "sparse" in about]
+    views = {about["bufferView"] for about in described if "bufferView" in about}
+    return views.union(*map(views_of, sparse))
 
 
 def _primitives(json: Json) -> Iterator[Json]:
