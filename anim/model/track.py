@@ -126,17 +126,17 @@ class Track:
         storage: AccessorFormat = FLOAT32,
     ) -> Track:
         """Return the track of fields that are valid and read-only already: files have thousands of them."""
-        track = object.__new__(cls)
-        _set_node(track, node)
-        _set_path(track, path)
-        _set_interpolation(track, interpolation)
-        _set_time_axis(track, time_axis)
-        _set_values(track, values)
-        _set_in_tangents(track, in_tangents)
-        _set_out_tangents(track, out_tangents)
-        _set_pointer(track, pointer)
-        _set_storage(track, storage)
-        _set_digest(track, None)
+        track, set_field = object.__new__(cls), object.__setattr__
+        set_field(track, "node", node)
+        set_field(track, "path", path)
+        set_field(track, "interpolation", interpolation)
+        set_field(track, "time_axis", time_axis)
+        set_field(track, "values", values)
+        set_field(track, "in_tangents", in_tangents)
+        set_field(track, "out_tangents", out_tangents)
+        set_field(track, "pointer", pointer)
+        set_field(track, "storage", storage)
+        set_field(track, "_digest", None)
         return track
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -240,19 +240,6 @@ class Track:
         return f"Track({target}, {self.interpolation}, keys={len(self.times)}, {span})"
 
 
-# Of the slots themselves, in their order: `object.__setattr__`, which looks each name up, takes nearly twice the time.
-(
-    _set_node,
-    _set_path,
-    _set_interpolation,
-    _set_time_axis,
-    _set_values,
-    _set_in_tangents,
-    _set_out_tangents,
-    _set_pointer,
-    _set_storage,
-    _set_digest,
-) = (getattr(Track, each.name).__set__ for each in fields(Track))
 _copied = operator.attrgetter(*(each.name for each in fields(Track) if each.init and each.name != "node"))
 
 
