@@ -152,28 +152,38 @@ class ConcatenatedTracks(TrackGroup):
         number = np.array([pairs.setdefault(pair, len(pairs)) for pair in zip(axes, rows.tolist(), strict=True)])
         if 2 * len(pairs) > len(self.tracks):
             return self.find_intervals(at[rows])
-        found = [find_interval(axis.times, at[row]) for axis, row in pairs]
-        left, right, u, duration = (np.stack(parts)[number] for parts in zip(*found, strict=True))
-        return KeyInterval(left + self.starts[:, None], right + self.starts[:, None], u, duration)
+        times, of_pair = [axis.times for axis, _ in pairs], [row for _, row in pairs]
+        counts = np.array([len(each) for each in times])
+        starts = np.cumsum(counts) - counts
+        found = _find_intervals(np.concatenate(times), starts, counts, at[of_pair])
+        left, right, u, duration = (part[number] for part in found)
+        moved = (self.starts - starts[number])[:, None]
+        return KeyInterval(left + moved, right + moved, u, duration)
 
     def find_intervals(self, at: Floats) -> KeyInterval:
         """Return the key intervals (T, F) of the times `at` (T, F) s, as by `find_interval`."""
-        last = self.counts[:, None] - 1
-        in_track = np.clip(self._count_keys(at) - 1, 0, last)
-        left = self.starts[:, None] + in_track
-        right = self.starts[:, None] + np.minimum(in_track + 1, last)
-        duration = self.times[right] - self.times[left]
-        inside = (at > self.times[left]) & (duration > 0)
-        u = np.where(inside, (at - self.times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
-        return KeyInterval(left, right, u, duration)
+        return _find_intervals(self.times, self.starts, self.counts, at)
 
-    def _count_keys(self, at: Floats) -> Ints:
-        """Number of keys (T, F) of each track at or before its times `at` (T, F)."""
-        if len(self.times) * at.shape[1] > MAX_COMPARED_PER_TRACK * len(self.tracks):
-            found = [track.times.searchsorted(each, "right") for track, each in zip(self.tracks, at, strict=True)]
-            return np.array(found, np.int64)
-        before = self.times[:, None] <= np.repeat(at, self.counts, axis=0)
-        return np.asarray(np.add.reduceat(before, self.starts, axis=0, dtype=np.int64))
+
+def _find_intervals(times: Floats, starts: Ints, counts: Ints, at: Floats) -> KeyInterval:
+    """The key intervals (A, F) of times `at` (A, F) s in A axes, concatenated as `times`."""
+    last = counts[:, None] - 1
+    in_axis = np.clip(_count_keys(times, starts, counts, at) - 1, 0, last)
+    left = starts[:, None] + in_axis
+    right = starts[:, None] + np.minimum(in_axis + 1, last)
+    duration = times[right] - times[left]
+    inside = (at > times[left]) & (duration > 0)
+    u = np.where(inside, (at - times[left]) / np.where(duration > 0, duration, 1.0), 0.0)
+    return KeyInterval(left, right, u, duration)
+
+
+def _count_keys(times: Floats, starts: Ints, counts: Ints, at: Floats) -> Ints:
+    """Number of keys (A, F) of each of the axes at or before its times `at` (A, F)."""
+    if len(times) * at.shape[1] > MAX_COMPARED_PER_TRACK * len(counts):
+        axes = np.split(times, starts[1:])
+        return np.array([axis.searchsorted(each, "right") for axis, each in zip(axes, at, strict=True)], np.int64)
+    before = times[:, None] <= np.repeat(at, counts, axis=0)
+    return np.asarray(np.add.reduceat(before, starts, axis=0, dtype=np.int64))
 
 
 def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:

@@ -138,7 +138,7 @@ def test_stl_of_text_in_latin_1_is_read(call: Call, tmp_path: Path) -> None:
 def test_a_scale_beyond_all_lengths_is_wrong_usage(scale: str, call: Call, tmp_path: Path) -> None:
     (tmp_path / "in.csv").write_text("time,a.rx\n0,0\n1,1\n")
     said = refusal(call("from-euler", tmp_path / "in.csv", tmp_path / "out.glb", "--scale", scale), 2)
-    assert said.endswith("(expected a number above 0, at most 1e+15)")
+    assert said.endswith("(expected 1e-12 to 1e+15)")
 
 
 def test_an_array_header_that_does_not_end_is_refused(call: Call, tmp_path: Path) -> None:

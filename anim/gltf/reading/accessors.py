@@ -42,9 +42,11 @@ class Accessors:
     def check_total(self, indices: Iterable[int]) -> None:
         """Raise UnsupportedError if these accessors, each once, would take more memory than the limit allows."""
         chosen = {index for index in indices if index not in self._given}
-        total = sum(8 * self._accessors[i]["count"] * _components(self._accessors[i]["type"]) for i in chosen)
-        views = {self._accessors[i]["bufferView"] for i in chosen if "bufferView" in self._accessors[i]}
-        packed = filter(None, (buffer_layout.compression(self._views[view]) for view in views - self._bytes.keys()))
+        described = [self._accessors[i] for i in chosen]
+        total = 8 * sum([about["count"] * _components(about["type"]) for about in described])
+        views = {about["bufferView"] for about in described if "bufferView" in about} - self._bytes.keys()
+        extended = [view for view in map(self._views.__getitem__, views) if "extensions" in view]
+        packed = filter(None, map(buffer_layout.compression, extended))
         self.budget.check(total + sum(each["count"] * each["byteStride"] for each in packed))
 
     def about(self, index: int) -> Json:
@@ -78,12 +80,13 @@ class Accessors:
         return self._located(index, self._floats)
 
     def plain_floats(self, indices: Iterable[int]) -> dict[int, Floats]:
-        """Return `floats` of those accessors that are uncompressed float32 vectors, decoded in one call.
+        """Return all numbers, (count × components,), of those accessors that are uncompressed float32 vectors.
 
-        Parts of one read-only array. Without the others, and empty if a number is not finite.
+        Decoded in one call: parts of one read-only array. Without the others, and empty if a number is not finite.
         """
         words: dict[int, NDArray[Any]] = {}  # of buffers, as float32
-        parts, places, size = [], [], 0
+        runs: list[list[int]] = []  # accessors next to each other: buffer, first word, and the one after the last
+        places, size = [], 0
         for index in dict.fromkeys(indices):
             about = self._accessors[index]
             rows = FLOAT_VECTORS.get((about["componentType"], about["type"]))
@@ -92,19 +95,23 @@ class Accessors:
             view = self._views[about["bufferView"]]
             if "extensions" in view or view.get("byteStride", 4 * rows) != 4 * rows:
                 continue
-            number, count = view["buffer"], about["count"]
+            number, length = view["buffer"], about["count"] * rows
             if number not in words:
                 words[number] = _float_words(self._document.buffers[number])
-            start = view.get("byteOffset", 0) + about.get("byteOffset", 0)
-            part = words[number][start // 4 : start // 4 + count * rows]
-            if start % 4 == 0 and len(part) == count * rows:
-                parts.append(part)
-                places.append((index, size, size := size + len(part), count, rows))
+            first, odd = divmod(view.get("byteOffset", 0) + about.get("byteOffset", 0), 4)
+            if odd or first + length > len(words[number]):
+                continue
+            if runs and runs[-1][0] == number and runs[-1][2] == first:
+                runs[-1][2] += length
+            else:
+                runs.append([number, first, first + length])
+            places.append((index, size, size := size + length))
         self.budget.add(8 * size)
+        parts = [words[number][first:end] for number, first, end in runs]
         joined = freeze(np.concatenate(parts, dtype=np.float64)) if parts else np.zeros(0)
         if not is_finite(joined):
             return {}
-        return {index: joined[start:end].reshape(count, rows) for index, start, end, count, rows in places}
+        return {index: joined[start:end] for index, start, end in places}
 
     def integers(self, index: int) -> Ints:
         """Return the values (count, components) as int64. Raises FormatError for floats."""
@@ -205,6 +212,7 @@ def _stored_bytes(document: Document) -> int:
     return sum(sizes.values())
 
 
+@cache
 def _components(kind: str) -> int:
     columns, rows = buffer_layout.COMPONENTS.get(kind, (0, 0))
     return columns * rows

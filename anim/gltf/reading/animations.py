@@ -67,8 +67,10 @@ class Reader:
         if interpolation is None:
             raise FormatError(f"interpolation is '{name}' (expected STEP, LINEAR or CUBICSPLINE)")
         number = sampler["output"]
-        axis = self._time_axes.get(sampler["input"]) or self._axis(sampler["input"])
-        count = len(axis)
+        axis = self._time_axes.get(sampler["input"])
+        if axis is None:
+            axis = self._axis(sampler["input"])
+        count = len(axis.times)
         output = self._accessors.about(number)
         storage = _storage(path, output["componentType"], output.get("normalized", False), output["type"])
         # components per key; None if only the data determines it
@@ -110,8 +112,8 @@ class Reader:
             raise FormatError(f"input accessor {index} is {got} (expected SCALAR of {FLOAT})")
         plain = self._plain.get(index)
         try:
-            times = arrays.freeze(self._accessors.floats(index)) if plain is None else plain
-            found = self._time_axes[index] = TimeAxis(times[:, 0])
+            times = arrays.freeze(self._accessors.floats(index))[:, 0] if plain is None else plain
+            found = self._time_axes[index] = TimeAxis(times)
         except AnimError as error:
             raise FormatError(error.problem, where=error.where, help=error.help) from None
         return found

@@ -19,7 +19,7 @@ DRACO = "KHR_draco_mesh_compression"
 def check(json: Json) -> None:
     """Raise FormatError at the first view or accessor that exceeds its bounds or is misaligned."""
     buffers, views = json_array(json, "buffers"), json_array(json, "bufferViews")
-    for i, view in enumerate(views):
+    for i, view in enumerate([] if _are_plain(views, buffers) else views):
         try:
             _check_view(view, buffers)
         except FormatError as error:
@@ -63,6 +63,14 @@ def compression(view: Json) -> Json | None:
                 raise FormatError("is no object", where="extensions.meshopt")
             return found
     return None
+
+
+def _are_plain(views: list[Json], buffers: list[Json]) -> bool:
+    """Return True if all views are within their buffers and have nothing else to check, as in most files."""
+    lengths = [buffer["byteLength"] for buffer in buffers]
+    if any(view.get("byteOffset", 0) + view["byteLength"] > lengths[view["buffer"]] for view in views):
+        return False
+    return not any("byteStride" in view or "extensions" in view for view in views)
 
 
 def _check_view(view: Json, buffers: list[Json]) -> None:
@@ -120,10 +128,14 @@ def _check_accessor(accessor: Json, views: list[Json]) -> None:
         _check_sparse(accessor["sparse"], size, count, views)
 
 
+@cache
+def _alignment(component_type: int, kind: str) -> int:
+    unit = COMPONENT_SIZES[component_type]
+    return max(unit, 4) if kind in ("MAT2", "MAT3", "MAT4") else unit
+
+
 def _check_aligned(accessor: Json, view: Json) -> None:
-    unit = COMPONENT_SIZES[accessor["componentType"]]
-    if accessor["type"] in ("MAT2", "MAT3", "MAT4"):
-        unit = max(unit, 4)
+    unit = _alignment(accessor["componentType"], accessor["type"])
     offset = accessor.get("byteOffset", 0)
     if offset % unit:
         raise FormatError(f"is {offset} (expected a multiple of {unit})", where="byteOffset")

@@ -36,15 +36,16 @@ def check(json: Json) -> None:
 
     Files of real exporters contain two channels for one pointer outside the nodes; they are read and kept.
     """
-    nodes = json_array(json, "nodes")
+    count = len(json_array(json, "nodes"))
     for i, animation in enumerate(json_array(json, "animations")):
+        targets = [channel_target(channel) for channel in animation["channels"]]
+        animated = [(each[0], each[1]) for each in targets if each is not None and each[0] is not None]
+        if len(set(animated)) == len(animated) and max([node for node, _ in animated], default=0) < count:
+            continue
         seen: set[tuple[int, str]] = set()
-        for k, channel in enumerate(animation["channels"]):
-            found = channel_target(channel)
-            if found is None:
-                continue
+        for k, target in enumerate(targets):
             try:
-                _check(found, nodes, seen)
+                _check(target, count, seen)
             except FormatError as error:
                 raise error.at(f"animations[{i}].channels[{k}].target", ".") from None
 
@@ -67,15 +68,18 @@ def target_count(json: Json, node: int) -> int:
     return len(primitives[0].get("targets", ())) if primitives else 0
 
 
-def _check(target: Target, nodes: list[Json], seen: set[tuple[int, str]]) -> None:
+def _check(target: Target | None, count: int, seen: set[tuple[int, str]]) -> None:
+    """Check the target of a channel. count: number of nodes. seen: properties of the clip's channels before it."""
+    if target is None:
+        return
     node, path, _ = target
     if node is None:
         return
     if (node, path) in seen:
         raise FormatError(f"is the second channel for node {node}, {path}")
     seen.add((node, path))
-    if node >= len(nodes):
-        raise FormatError(f"names node {node} (the file has {len(nodes)} nodes)")
+    if node >= count:
+        raise FormatError(f"names node {node} (the file has {count} nodes)")
 
 
 def has_weight_pointers(json: Json) -> bool:

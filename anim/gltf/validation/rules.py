@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any, TypeAlias
@@ -45,12 +46,14 @@ class ObjectRule:
         """Return True if all values pass, by property: in half the time of the checks one by one."""
         if not set(map(type, values)) <= {dict}:
             return False
-        for key in self.properties.keys() | self.required:
-            column = [value[key] for value in values if key in value]
-            if len(column) < len(values) and key in self.required:
-                return False
-            if column and not _pass(self.properties.get(key), column):
-                return False
+        try:
+            columns = [(key, list(map(operator.itemgetter(key), values))) for key in self.required]
+        except KeyError:
+            return False
+        optional = self.properties.keys() - self.required
+        columns += [(key, [value[key] for value in values if key in value]) for key in optional]
+        if not all(_pass(self.properties.get(key), column) for key, column in columns if column):
+            return False
         return self.whole is None or _none_refused(self.whole, values)
 
 

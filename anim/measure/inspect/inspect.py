@@ -39,7 +39,7 @@ def inspect(contents: FileContents, *, chosen: Iterable[int] | None = None, trac
     groups = concatenate([track for clip in looked_at for track in clip.tracks])
     counted = stats(groups, skeleton)
     ends = np.cumsum([0, *(len(clip.tracks) for clip in looked_at)])
-    ways = root_motion.root_motions(skeleton, looked_at, groups, figure=root_motion.figure_nodes(json, skeleton))
+    ways = root_motion.root_motions(skeleton, looked_at, figure=root_motion.figure_nodes(json, skeleton))
     seams = _seams(contents.motion, looked_at, groups)
     measured_on = "skin" if contents.motion.is_skin else "nodes"
     costs, cost = storage_cost.storage_costs(document)

@@ -11,13 +11,11 @@ import numpy as np
 from anim.arrays import Floats
 from anim.maths import hierarchy
 from anim.model import Clip, Skeleton
-from anim.sampling.batch import ConcatenatedTracks
 from anim.sampling.clips import sample_world_matrices
 from anim.sampling.scene_parts import select_nodes, select_tracks
 
 MIN_DISPLACEMENT_PER_PATH = 0.7
-MAX_MATRICES = 100_000  # clips × nodes that are sampled at once; of more only the nodes above the roots
-BLOCK_CLIPS = 64  # so many of the clips at once
+BLOCK_CLIPS = 64  # that are sampled at once
 
 
 class RootMotion(NamedTuple):
@@ -32,58 +30,37 @@ class RootMotion(NamedTuple):
 
 
 def root_motions(
-    skeleton: Skeleton,
-    clips: Sequence[Clip],
-    groups: Sequence[ConcatenatedTracks] | None = None,
-    *,
-    figure: AbstractSet[int] | None = None,
+    skeleton: Skeleton, clips: Sequence[Clip], *, figure: AbstractSet[int] | None = None
 ) -> list[RootMotion]:
     """Return the RootMotion of each clip; none for clips of zero duration.
 
-    groups: the tracks of all clips from `concatenate`, if the caller has them.
     figure: nodes that can be the root, see `figure_nodes`; None for all.
     """
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
     depth = skeleton.derive(_depths)
     roots = [_root(clip, depth, figure) if clip.end > clip.start else -1 for clip in clips]
-    if max(roots) < 0:
-        return [RootMotion(-1, 0.0, 0.0) for _ in clips]
-    times = np.array([[clip.start, clip.end] for clip in clips])
-    if len(clips) * len(skeleton) <= MAX_MATRICES:
-        ways = _ways(skeleton, clips, roots, times, groups)
-    else:
-        blocks = (slice(first, first + BLOCK_CLIPS) for first in range(0, len(clips), BLOCK_CLIPS))
-        ways = [way for one in blocks for way in _ways_of_chains(skeleton, clips[one], roots[one], times[one])]
+    blocks = (slice(first, first + BLOCK_CLIPS) for first in range(0, len(clips), BLOCK_CLIPS))
+    ways = [way for one in blocks for way in _ways(skeleton, clips[one], roots[one])]
     return [_travel(*each) for each in zip(clips, roots, ways, strict=True)]
 
 
-def _ways_of_chains(skeleton: Skeleton, clips: Sequence[Clip], roots: Sequence[int], times: Floats) -> list[Floats]:
-    """As `_ways`, on the roots and the nodes above them alone."""
+def _ways(skeleton: Skeleton, clips: Sequence[Clip], roots: Sequence[int]) -> list[Floats]:
+    """The displacement (3,) of each clip's root from start to end, m; of a clip without one that of any node.
+
+    Only the roots and the nodes above them are sampled.
+    """
     chosen = np.zeros(len(skeleton), np.bool_)
     chosen[[root for root in roots if root >= 0]] = True
     nodes = np.flatnonzero(hierarchy.with_ancestors(skeleton.parents, chosen))
     if not len(nodes):
         return [np.zeros(3)] * len(clips)
     own = [select_tracks(clip, nodes) for clip in clips]
-    places = [int(np.searchsorted(nodes, root)) for root in roots]  # 0 without a root
-    return _ways(select_nodes(skeleton, nodes), own, places, times)
-
-
-def _ways(
-    skeleton: Skeleton,
-    clips: Sequence[Clip],
-    roots: Sequence[int],
-    times: Floats,
-    groups: Sequence[ConcatenatedTracks] | None = None,
-) -> list[Floats]:
-    """The displacement (3,) of each clip's root, m, between times (clips, 2); of a clip without one that of any node.
-
-    groups: as of `root_motions`.
-    """
-    world, _ = sample_world_matrices(skeleton, clips, times, groups=groups)
-    places = world[..., 3].reshape(len(skeleton), len(clips), 2, 3)
-    return [places[root, i, 1] - places[root, i, 0] for i, root in enumerate(roots)]
+    times = np.array([[clip.start, clip.end] for clip in clips])
+    world, _ = sample_world_matrices(select_nodes(skeleton, nodes), own, times)
+    places = world[..., 3].reshape(len(nodes), len(clips), 2, 3)
+    at = np.searchsorted(nodes, roots)  # 0 without a root
+    return [places[root, i, 1] - places[root, i, 0] for i, root in enumerate(at.tolist())]
 
 
 def figure_nodes(json: Mapping[str, Any], skeleton: Skeleton) -> frozenset[int]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json as jsonlib
 from collections import Counter
+from functools import cache
 from itertools import chain
 from typing import NamedTuple
 
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation import buffer_layout
-from anim.gltf.writing.references import views_of
+from anim.gltf.writing.references import sampled_accessors, views_of_all
 from anim.measure.inspect.stored_bytes import stored_bytes
 
 
@@ -38,10 +39,10 @@ def storage_costs(document: Document) -> tuple[list[StorageCost], StorageCost]:
     used: dict[tuple[int, ...], tuple[int, int, set[int]]] = {}  # by accessors: data, JSON, and views
     num_users: Counter[tuple[int, ...]] = Counter()
     for animation in json_array(content, "animations"):
-        numbers = tuple(sorted({sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}))
+        numbers = tuple(sorted(sampled_accessors(animation["samplers"])))
         if numbers not in used:
             named = [accessors[i] for i in numbers]
-            of_views = {view for accessor in named for view in views_of(accessor)}
+            of_views = views_of_all(named)
             described = [named, [views[i] for i in sorted(of_views)]]
             text = sum(len(_text(part)) - 1 for part in described if part)
             used[numbers] = sum(map(_size, named)), text, of_views
@@ -65,7 +66,12 @@ _encoder = jsonlib.JSONEncoder(separators=(",", ":"), ensure_ascii=False, check_
 
 
 def _size(accessor: Json) -> int:
-    stored = "bufferView" in accessor or "sparse" in accessor
-    if not stored or accessor["type"] not in buffer_layout.COMPONENTS:
+    if "bufferView" not in accessor and "sparse" not in accessor:
         return 0
-    return int(accessor["count"]) * buffer_layout.element_size(accessor["componentType"], accessor["type"])
+    return int(accessor["count"]) * _element_size(accessor["componentType"], accessor["type"])
+
+
+@cache
+def _element_size(component_type: int, kind: str) -> int:
+    """Bytes of an element, 0 of a type that glTF does not know."""
+    return buffer_layout.element_size(component_type, kind) if kind in buffer_layout.COMPONENTS else 0

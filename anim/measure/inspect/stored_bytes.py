@@ -5,7 +5,7 @@ from __future__ import annotations
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation import buffer_layout
 from anim.gltf.writing import byte_ranges
-from anim.gltf.writing.references import references_outside, views_of
+from anim.gltf.writing.references import references_outside, sampled_accessors, views_of_all
 
 
 def stored_bytes(document: Document) -> int:
@@ -14,23 +14,21 @@ def stored_bytes(document: Document) -> int:
     clips = json_array(content, "animations")
     samplers = [sampler for animation in clips for sampler in animation["samplers"]]
     others = references_outside(content, range(len(clips))).accessors
-    mine = {sampler[key] for sampler in samplers for key in ("input", "output")} - others
     accessors, views = json_array(content, "accessors"), json_array(content, "bufferViews")
-    spans: dict[int, list[byte_ranges.Range]] = {}  # by view
-    for about in (accessors[number] for number in mine):
-        for view in views_of(about):
-            parts = spans.setdefault(view, [])
-            if about.get("bufferView") == view:
-                parts.append(_span(about))
-    return sum(_bytes_in(views[view], parts) for view, parts in spans.items())
+    mine = [accessors[number] for number in sampled_accessors(samplers) - others]
+    spans: dict[int, list[byte_ranges.Range]] = {view: [] for view in views_of_all(mine)}
+    for about in mine:
+        if "bufferView" in about:
+            spans[about["bufferView"]].append(_span(about))
+    return sum([_bytes_in(views[view], parts) for view, parts in spans.items()])
 
 
 def _bytes_in(view: Json, parts: list[byte_ranges.Range]) -> int:
     """Bytes of these parts of a view; of a compressed one all of its bytes as stored."""
-    found = buffer_layout.compression(view)
+    found = buffer_layout.compression(view) if "extensions" in view else None
     if found is not None:
         return int(found["byteLength"])
-    return sum(end - start for start, end in (byte_ranges.union(parts) if len(parts) > 1 else parts))
+    return sum([end - start for start, end in (byte_ranges.union(parts) if len(parts) > 1 else parts)])
 
 
 def _span(accessor: Json) -> byte_ranges.Range:

@@ -105,22 +105,23 @@ def _all_stats(groups: Sequence[ConcatenatedTracks], skeleton: Skeleton) -> tupl
 
 def _count(group: ConcatenatedTracks, skeleton: Skeleton, result: TrackStats, given: dict[int, Bools]) -> None:
     """Write the statistics of a group into `result`, masks of its tracks' interpolated keys into `given`."""
-    values = group.values
+    values, lengths = group.values, None
     if group.kind is ValueKind.ROTATION:
-        values = _step_angles(group, result)
-    constant = _same_values(group, values)
+        lengths = _lengths(group)
+        values = _step_angles(group, lengths, result)
+    extent = _extent(group, values)
+    constant = _same_values(group, values, extent)
     result.constant[group.numbers] = constant
     result.no_effect[group.numbers] = _at_rest(group, constant, skeleton)
     fewest = 1 if group.tangents is None else 2
     result.redundant[group.numbers] = np.where(constant, np.maximum(group.counts - fewest, 0), 0)
-    mask = _redundant(group, values, constant)
+    mask = _redundant(group, values, lengths, constant, extent)
     for i in np.flatnonzero(~constant).tolist():
         given[int(group.numbers[i])] = mask[group.starts[i] : group.starts[i] + group.counts[i]]
 
 
-def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:
-    """The rotations (S, 4) at unit length with aligned signs; their counts are written into `result`."""
-    lengths = _lengths(group)
+def _step_angles(group: ConcatenatedTracks, lengths: Floats, result: TrackStats) -> Floats:
+    """The rotations (S, 4) of lengths (S,) at unit length, signs aligned; their counts are written into `result`."""
     values = group.values / np.where(lengths > 0, lengths, 1)[..., None]
     dots = np.ones(len(values))  # of each key with the one before it; the first of a track has none
     dots[1:] = quaternion.dot(values[1:], values[:-1])
@@ -135,8 +136,8 @@ def _step_angles(group: ConcatenatedTracks, result: TrackStats) -> Floats:
     return values * np.cumprod(np.where(dots < 0, -1.0, 1.0))[:, None]
 
 
-def _same_values(group: ConcatenatedTracks, values: Floats) -> Bools:
-    least, most = _extent(group, values)
+def _same_values(group: ConcatenatedTracks, values: Floats, extent: tuple[Floats, Floats]) -> Bools:
+    least, most = extent
     first = values[group.starts]
     off = np.maximum(most - first, first - least).max(axis=1)
     same: Bools = off <= FLOAT32_TOLERANCE * _sizes(least, most)
@@ -160,24 +161,35 @@ def _at_rest(group: ConcatenatedTracks, constant: Bools, skeleton: Skeleton) -> 
     return constant & near
 
 
-def _redundant(group: ConcatenatedTracks, values: Floats, constant: Bools) -> Bools:
-    """Mask (S,) of inner keys of moving tracks that are interpolated by their neighbors."""
+def _redundant(
+    group: ConcatenatedTracks,
+    values: Floats,
+    lengths: Floats | None,
+    constant: Bools,
+    extent: tuple[Floats, Floats],
+) -> Bools:
+    """Mask (S,) of inner keys of moving tracks that are interpolated by their neighbors.
+
+    values: rotations at unit length. lengths: (S,), as stored. extent: of the values of each track.
+    """
     of_track = np.repeat(np.arange(len(constant)), group.counts)
     inner = ~constant[of_track]
     inner[group.starts] = inner[group.starts + group.counts - 1] = False
-    least, most = _extent(group, values)
+    least, most = extent
     allowed = KEY_TOLERANCE_PER_RANGE * (most - least).max(axis=1) + FLOAT32_TOLERANCE * _sizes(least, most)
     chosen = np.flatnonzero(inner)
     for start in range(0, len(chosen), BLOCK_KEYS):
         at = chosen[start : start + BLOCK_KEYS]
-        inner[at] = _is_interpolated(group, values, of_track, at, allowed[of_track[at]])
+        inner[at] = _is_interpolated(group, values, lengths, of_track, at, allowed[of_track[at]])
     return np.asarray(inner)
 
 
-def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, at: Ints, allowed: Floats) -> Bools:
+def _is_interpolated(
+    group: ConcatenatedTracks, values: Floats, lengths: Floats | None, of_track: Ints, at: Ints, allowed: Floats
+) -> Bools:
     """Mask (A,) of the inner keys at indices `at` (A,) that are interpolated by their neighbors.
 
-    allowed: (A,) largest difference.
+    lengths: (S,), of rotations. allowed: (A,) largest difference.
     """
     before, here, after = values[at - 1], values[at], values[at + 1]
     if group.interpolation is Interpolation.STEP:
@@ -186,17 +198,19 @@ def _is_interpolated(group: ConcatenatedTracks, values: Floats, of_track: Ints, 
     u = (group.times[at] - group.times[at - 1]) / duration
     if group.tangents is not None:
         return _is_interpolated_cubic(group.tangents, values, at, u[:, None], duration[:, None], allowed)
-    if group.kind is not ValueKind.ROTATION:
+    if lengths is None:
         between = before + u[:, None] * (after - before)
         return np.asarray(_widest(here - between) <= allowed)
     same = _widest(here - quaternion.slerp(before, after, u)) <= allowed
     narrow = quaternion.dot(before, after) > np.cos(WIDE_STEP_RAD / 2)
-    return np.asarray(same & narrow & _same_lengths(group, of_track, at, u, allowed))
+    return np.asarray(same & narrow & _same_lengths(group, lengths, of_track, at, u, allowed))
 
 
-def _same_lengths(group: ConcatenatedTracks, of_track: Ints, at: Ints, u: Floats, allowed: Floats) -> Bools:
+def _same_lengths(
+    group: ConcatenatedTracks, lengths: Floats, of_track: Ints, at: Ints, u: Floats, allowed: Floats
+) -> Bools:
     """Return whether stored quaternions have the length interpolated from their neighbors."""
-    before, here, after = (np.sqrt(quaternion.dot(q, q)) for q in (group.values[at + k] for k in (-1, 0, 1)))
+    before, here, after = lengths[at - 1], lengths[at], lengths[at + 1]
     steps = np.array([MAX_INTEGERS.get(track.storage.component_type, np.inf) for track in group.tracks])
     off = np.abs(here - (before + u * (after - before)))
     return np.asarray(off <= allowed + 2 / steps[of_track[at]])

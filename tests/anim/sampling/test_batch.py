@@ -7,16 +7,16 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from anim.arrays import Floats, Ints
 from anim.model import TimeAxis
 from anim.sampling import batch as module
 from anim.sampling import lazy_batch, sample_pose
 from anim.sampling.batch import MixedBatch, concatenate
 from anim.sampling.lazy_batch import LazyBatch, batches
 from anim.sampling.players import PLAYERS, sampler
-from anim.sampling.track import find_interval, sample
+from anim.sampling.track import KeyInterval, find_interval, sample
 from tests import clips
 from tests.anim.operations.tracks import TRACKS
-from tests.calls import count_calls
 from tests.clips import CUBICSPLINE
 
 SINGLE = clips.track("translation", [2.0], [[1.0, 2.0, 3.0]])
@@ -46,11 +46,18 @@ def test_intervals_are_found_once_per_axis_and_row(shared: bool, monkeypatch: py
     axes = [axis] * 6 if shared else [TimeAxis([0.0, 0.5, 2 + n]) for n in range(6)]
     (group,) = concatenate([clips.track("translation", each, np.ones((3, 3))) for each in axes])
     at, rows = np.array([[-1, 0, 0.25, 2, 9], [0.5, 0.75, 1, 1, 3.0]]), np.array([0, 0, 1, 0, 1, 1])
-    counted = count_calls(monkeypatch, module, "find_interval")
+    searched: list[int] = []  # number of axes, by call
+    search = module._find_intervals
+
+    def note(times: Floats, starts: Ints, counts: Ints, at: Floats) -> KeyInterval:
+        searched.append(len(counts))
+        return search(times, starts, counts, at)
+
+    monkeypatch.setattr(module, "_find_intervals", note)
     found, expected = group.intervals_of_rows(at, rows), group.find_intervals(at[rows])
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one, other)
-    assert len(counted) == (2 if shared else 0)
+    assert searched == [2 if shared else 6, 6]
 
 
 @pytest.mark.parametrize("player", list(PLAYERS))
