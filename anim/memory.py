@@ -35,7 +35,10 @@ def limit_for(file_bytes: int) -> int:
 
 @contextmanager
 def limit_allocations(size: int) -> Iterator[None]:
-    """Let allocations beyond `size` bytes fail inside the block, on Linux: for native packages that count nothing."""
+    """Let allocations fail inside the block, on Linux, once the process has `size` bytes of data.
+
+    For native packages that count nothing. Half of `size` can be allocated, however much the process has already.
+    """
     used = _data_bytes()
     if used is None:
         yield
@@ -43,7 +46,7 @@ def limit_allocations(size: int) -> Iterator[None]:
     import resource
 
     usual = resource.getrlimit(resource.RLIMIT_DATA)
-    most = used + size + THREAD_BYTES * (os.cpu_count() or 1)
+    most = max(size, used + size // 2) + THREAD_BYTES * (os.cpu_count() or 1)
     if usual[0] != resource.RLIM_INFINITY and usual[0] < most:
         yield
         return
