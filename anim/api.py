@@ -15,16 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from anim.arguments import (
-    Length,
-    check_choice,
-    check_function,
-    check_max_bytes,
-    check_workers,
-    glob_list,
-    meters,
-    radians,
-)
+from anim.arguments import Length, check_choice, check_function, check_workers, glob_list, meters, num_bytes, radians
 from anim.arrays import Floats, as_floats
 from anim.asset import Asset, AssetLike, PathName, as_asset, copy_asset
 from anim.baked_cache import BakedCache, BakeOrigin
@@ -75,7 +66,7 @@ def optimize(
     asset: AssetLike,
     *,
     max_error: Length | None = None,
-    max_bytes: int | None = None,
+    max_bytes: str | int | None = None,
     clips: str | Sequence[str] | None = None,
     max_angle: str | float | None = None,
     max_speed_error: Length | None = None,
@@ -89,8 +80,8 @@ def optimize(
 ) -> OptimizeResult:
     """Return the asset with smaller animations and no vertex displaced by more than `max_error`.
 
-    max_error: "0.5mm", "0.01%" (the default), or metres; 0 is lossless. max_bytes: of the asset as a GLB, for the
-    smallest error that fits, up to `max_error`, by default 10 % of the diagonal; raises RangeError if nothing fits.
+    max_error: "0.5mm", "0.01%" (the default), or metres; 0 is lossless. max_bytes: of the asset as a GLB, 800_000
+    or "800kB": the smallest error that fits, up to `max_error`, by default 10 % of the diagonal; RangeError if none.
     clips: globs, all by default; an empty list is refused.
     max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
     keep_nodes: globs for nodes with exact motion. drop: "rest", "unused" or "never", removed channels at the rest pose.
@@ -118,7 +109,7 @@ def optimize(
     nodes = glob_list(keep_nodes or None, "keep_nodes")
     kept = Selection((), nodes).chosen_nodes(asset.skeleton) if nodes else ()
     check_workers(workers)
-    check_max_bytes(max_bytes)
+    limit = None if max_bytes is None else num_bytes(max_bytes, "max_bytes")
     if progress is not None:
         check_function(progress, "progress", "a function of the fraction done")
     check_choice("effort", effort, tuple(EFFORTS))
@@ -137,31 +128,18 @@ def optimize(
         asset.document,
         asset.scene,
         tuple(asset.clips),
-        chosen,
-        scale,
-        _glb_size,
-        workers or os.cpu_count() or 1,
+        chosen=chosen,
+        scale=scale,
+        written_size=_glb_size,
+        workers=workers or os.cpu_count() or 1,
         progress=lambda: nullcontext(progress or (lambda _: None)),
     )
-    if max_bytes is None:
+    if limit is None:
         found = optimizer.run(request)
     else:
-        request, found = _optimize_within(
-            optimizer, request, max_bytes, None if max_error is None else limits.max_error
-        )
+        ceiling = None if max_error is None else limits.max_error
+        request, found = ByteLimit(optimizer, limit, request, ceiling).run()
     return _build_result(asset, found, request.bounds, chosen)
-
-
-def _optimize_within(
-    optimizer: FileOptimizer, request: Request, max_bytes: int, ceiling: float | None
-) -> tuple[Request, Optimized]:
-    limit = ByteLimit(optimizer, max_bytes, request, ceiling)
-    found = limit.run()
-    if found.optimized is None:
-        assert found.smallest is not None
-        least = f"expected at least {found.smallest.size}, for an error of up to {limit.max_error:g} m"
-        raise RangeError(f"max_bytes is {max_bytes} ({least})")
-    return found.request, found.optimized
 
 
 def bake(

@@ -100,22 +100,23 @@ def radians(value: str | float, name: str) -> float:
     return float(value)
 
 
+def num_bytes(value: str | int, name: str) -> int:
+    """Return a number of bytes above 0 from a whole number, or from text: "800kB". Raises ShapeError or RangeError."""
+    if isinstance(value, str):
+        return units.parse_size(value, name)
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ShapeError(f"{name} is {kind(value)} (expected a number of bytes, or a size like '800kB')")
+    if value < 1:
+        raise RangeError(f"{name} is {value} (expected at least 1 byte, or a size like '800kB')")
+    return int(value)
+
+
 def check_workers(workers: object) -> None:
     """Raise ShapeError or RangeError unless `workers` is a number of processes."""
     if isinstance(workers, bool) or not isinstance(workers, Integral):
         raise ShapeError(f"workers is {kind(workers)} (expected a number of processes, 0 for one per core)")
     if workers < 0:
         raise RangeError(f"workers is {workers} (expected a number of processes, 0 for one per core)")
-
-
-def check_max_bytes(value: object) -> None:
-    """Raise ShapeError or RangeError unless `value` is a number of bytes or None."""
-    if value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise ShapeError(f"max_bytes is {kind(value)} (expected a number of bytes)")
-    if value < 1:
-        raise RangeError(f"max_bytes is {value} (expected at least 1)")
 
 
 def check_choice(name: str, value: str, known: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from anim.errors import RangeError
 from anim.optimization.clip_optimizer import ClipResult
 from anim.optimization.fast_sizes import MIN_SAMPLED, FastSizes
 from anim.optimization.file_optimizer import FAST, FileOptimizer
@@ -17,6 +18,7 @@ from anim.optimization.rate_distortion import (
     bound_below,
     bound_between,
     bound_for,
+    check_diagonal,
     next_bound,
     size_at,
     smallest_bound,
@@ -51,48 +53,47 @@ class _Result:
     tried: float
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """The result with the smallest error within a limit, and its request.
+class ByteLimitError(RangeError):
+    """Nothing fits. smallest: the point with the fewest bytes that was found. max_error: m, the greatest allowed."""
 
-    optimized: None if nothing fits. smallest: then the point with the fewest bytes that was found.
-    """
-
-    request: Request
-    optimized: Optimized | None
-    smallest: RatePoint | None = None
+    def __init__(self, max_bytes: int, smallest: RatePoint, max_error: float) -> None:
+        least = f"expected at least {smallest.size}, for an error of up to {max_error:g} m"
+        super().__init__(f"max_bytes is {max_bytes} ({least})")
+        self.smallest = smallest
+        self.max_error = max_error
 
 
 class ByteLimit:
     """A limit of bytes for a file as written.
 
     request: its bound counts only as the ceiling. ceiling: m, the greatest allowed error; None for a tenth of the
-    diagonal. max_error: m, that error.
+    diagonal. Raises FormatError for a model of infinite size.
     """
 
     def __init__(self, file: FileOptimizer, max_bytes: int, request: Request, ceiling: float | None = None) -> None:
+        check_diagonal(file.scale)
         self._file = file
         self._max_bytes = max_bytes
         self._request = request
         self._fast = FastSizes(file, request)
-        self.max_error = MAX_BOUND_PER_DIAGONAL * file.scale if ceiling is None else ceiling
+        self._most = MAX_BOUND_PER_DIAGONAL * file.scale if ceiling is None else ceiling
         # In the place of the bound: output of the same limit comes back unchanged.
         self._name = ("max_bytes", str(max_bytes), str(ceiling is None), *(request.given or (repr(request.bounds),)))
         self._clips: dict[int, _Clip] = {}  # of those that differ
 
-    def run(self) -> Fit:
-        """Search for the smallest error that fits."""
+    def run(self) -> tuple[Request, Optimized]:
+        """Return the result with the smallest error that fits, and its request. Raises ByteLimitError if none does."""
         file, named = self._file, replace(self._request, given=self._name)
         if is_output_of(file.document, file.clips, named, file.chosen):
-            return Fit(named, Optimized(file.document, {}, {}, unchanged=True))
+            return named, Optimized(file.document, {}, {}, unchanged=True)
         ratio = 1.0 if self._request.effort == FAST else USUAL_RATIO
-        bound = smallest_bound(self._max_bytes, file.scale, self._fast.at, ratio=ratio)
-        found = self._find_fitting(self.max_error if bound is None else min(bound, self.max_error))
+        bound = smallest_bound(self._max_bytes, file.scale, self._fast.measure, ratio=ratio)
+        found = self._find_fitting(self._most if bound is None else min(bound, self._most))
         best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
         if best is None:
-            smallest = min((*(each.point for each in found), self._fast.at(0.0)), key=lambda point: point.size)
-            return Fit(named, None, smallest)
-        return Fit(self._request.with_bound(best.point.max_error), best.optimized)
+            smallest = min((*(each.point for each in found), self._fast.measure(0.0)), key=lambda point: point.size)
+            raise ByteLimitError(self._max_bytes, smallest, self._most)
+        return self._request.with_bound(best.point.max_error), best.optimized
 
     def _find_fitting(self, bound: float) -> list[_Result]:
         """Results of verified searches: at larger bounds until one fits, then at smaller ones while bytes are unused.
@@ -103,13 +104,13 @@ class ByteLimit:
         found = [self._write()]
         step = 1.0
         for repair in range(MAX_REPAIRS):
-            if self._fits(found[-1]) or found[-1].tried >= self.max_error:
+            if self._fits(found[-1]) or found[-1].tried >= self._most:
                 break
             if repair == MAX_REPAIRS - 1:
                 found += self._find_fast(bound)
                 if self._fits(found[-1]):
                     break
-                self._search(list(self._clips), self.max_error)
+                self._search(list(self._clips), self._most)
             elif repair == MAX_REPAIRS - 2:
                 self._search(list(self._clips), self._fast.fitting_bound(self._max_bytes, above=found[-1].tried))
             else:
@@ -117,7 +118,7 @@ class ByteLimit:
                 step *= 2
             found.append(self._write())
         if not self._fits(found[-1]):
-            return found + self._find_fast(self.max_error)
+            return found + self._find_fast(self._most)
         best = found[-1].point
         for _ in range(MAX_REFINEMENTS):
             point = found[-1].point
@@ -139,7 +140,7 @@ class ByteLimit:
 
     def _find_fast(self, bound: float) -> list[_Result]:
         """The result of a fast search, which by chance can take fewer bytes; none if it is not likely to fit."""
-        if self._request.effort == FAST or (bound < self.max_error and self._fast.at(bound).size > self._max_bytes):
+        if self._request.effort == FAST or (bound < self._most and self._fast.measure(bound).size > self._max_bytes):
             return []
         request = replace(self._request.with_bound(bound), effort=FAST)
         results = self._file.search(request, self._fast.clips)
@@ -168,7 +169,7 @@ class ByteLimit:
     def _larger_bound(self, rest: Sequence[int], bound: float, *, uncertainty: float = 0.0) -> float:
         """The likely bound, m, of the remaining clips, not below one."""
         wanted = min(self._bound_of(rest, bound, uncertainty=uncertainty), MAX_RAISE_FACTOR * bound)
-        return min(max(wanted, bound), self.max_error)
+        return min(max(wanted, bound), self._most)
 
     def _bound_of(self, some: Sequence[int], bound: float, *, uncertainty: float) -> float:
         """The likely bound, m, of some clips, if the others stay as they are.
@@ -208,13 +209,13 @@ class ByteLimit:
         """
         tried = max(each.tried for each in self._clips.values())
         if not self._file.scale:
-            return self.max_error
+            return self._most
         if len(self._clips) < MIN_SAMPLED or not tried:
             bound = next_bound(tried, self._file.scale, point, self._max_bytes)
         else:
             saved = (point.size - self._max_bytes) / max(point.animation, 1) + REPAIR_FRACTION
             bound = bound_for(1 / max(1 - saved, 0.1), tried, self._file.scale, self._fast.exponent(tried))
-        return min(bound * (bound / tried) ** (step - 1) if tried else bound, self.max_error)
+        return min(bound * (bound / tried) ** (step - 1) if tried else bound, self._most)
 
     def _search(self, chosen: Sequence[int], bound: float) -> None:
         """Search some clips at a bound, m; a result that is in place and as good within it stays."""
@@ -231,13 +232,13 @@ class ByteLimit:
         """Return the file of the clips' results."""
         clips = self._clips.values()
         bound = max((each.bound for each in clips), default=0.0)
-        tried = min((each.tried for each in clips), default=self.max_error)
+        tried = min((each.tried for each in clips), default=self._most)
         return self._write_results({i: each.result for i, each in self._clips.items()}, bound, tried)
 
     def _write_results(self, results: Mapping[int, ClipResult], bound: float, tried: float) -> _Result:
         named = replace(self._request.with_bound(bound), given=self._name)
-        found = self._file.run(named, earlier=self._fast.of_all(results))
-        return _Result(found, self._file.point(bound, found), tried)
+        found = self._file.run(named, earlier=self._fast.expand(results))
+        return _Result(found, self._file.measure_point(bound, found), tried)
 
     def _fits(self, result: _Result) -> bool:
         return result.point.size <= self._max_bytes

@@ -36,7 +36,7 @@ class FastSizes:
             values = {i: sum(track.values.size for track in file.clips[i].tracks) for i in self.clips}
             self.sample = sorted(sorted(values, key=lambda i: -values[i])[::SAMPLE_STEP])
 
-    def at(self, max_error: float) -> RatePoint:
+    def measure(self, max_error: float) -> RatePoint:
         """Return the size at a bound, in m, by a fast search without verification.
 
         Of files with many clips all are searched at one bound, and some at the others: sizes are in proportion.
@@ -54,7 +54,7 @@ class FastSizes:
         """Return the exponent n around a bound, m, where bytes of animation are as bound^(-1/n)."""
         return local_exponent(bound, list(self._tried.values()))
 
-    def of_all(self, results: Mapping[int, ClipResult]) -> dict[int, ClipResult]:
+    def expand(self, results: Mapping[int, ClipResult]) -> dict[int, ClipResult]:
         """Return the results of all clips from those that differ."""
         return {i: results[original] for i, original in self.originals.items()}
 
@@ -64,14 +64,17 @@ class FastSizes:
         usual = FIRST_FRACTION * self._file.scale
         request = self._request.with_bound(usual)
         results = self._file.search(request, self.clips, verified=False)
-        found = self._file.run(request, verified=False, earlier=self.of_all(results))
-        return self._file.point(usual, found), estimate_sizes(results, request)
+        found = self._file.run(request, verified=False, earlier=self.expand(results))
+        return self._file.measure_point(usual, found), estimate_sizes(results, request)
 
     def _measured(self, max_error: float) -> RatePoint:
         if max_error == FIRST_FRACTION * self._file.scale:
             return self.first[0]
+        request = self._request.with_bound(max_error)
         if max_error == 0.0 or self.sample == self.clips:
-            return self._file.point(max_error, self._file.run(self._request.with_bound(max_error), verified=False))
+            return self._file.measure_point(
+                max_error, self._file.run(self._request.with_bound(max_error), verified=False)
+            )
         point, first = self.first
         request = self._request.with_bound(max_error)
         total = sum(first[i] for i in self.sample)

@@ -84,7 +84,7 @@ class FileOptimizer:
         num_keys = sum(track.values.size for i in searched for track in self.clips[i].tracks)
         return self.workers if len(searched) > 1 and num_keys > MIN_PARALLEL_KEYS else 1
 
-    def result(self, found: Optimized) -> tuple[Document, int]:
+    def choose_document(self, found: Optimized) -> tuple[Document, int]:
         """Return the optimized document, or the source if that takes no more bytes, with its size in bytes."""
         size = self.written_size(found.document)
         if found.unchanged or size >= self._source_size:
@@ -95,12 +95,12 @@ class FileOptimizer:
     def _source_size(self) -> int:
         return self.written_size(self.document)
 
-    def point(self, max_error: float, found: Optimized) -> RatePoint:
+    def measure_point(self, max_error: float, found: Optimized) -> RatePoint:
         """Return the rate-distortion point of a result within a bound, in m."""
-        document, size = self.result(found)
+        document, size = self.choose_document(found)
         error = 0.0 if document is self.document else found.max_error  # the source moves no vertex
         return RatePoint(max_error, size, error, animation_bytes(document))
 
     def find_point(self, request: Request, max_error: float) -> RatePoint:
         """Return the rate-distortion point of a bound, in m, by a fast search."""
-        return self.point(max_error, self.run(replace(request.with_bound(max_error), effort=FAST)))
+        return self.measure_point(max_error, self.run(replace(request.with_bound(max_error), effort=FAST)))

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from anim.errors import FormatError
+
 ERROR_FRACTIONS = tuple(
     10.0 ** (-exponent / 2) for exponent in range(10, 3, -1)
 )  # of the diagonal: 1e-5 to 1e-2, two a decade
@@ -33,6 +35,14 @@ class RatePoint:
     size: int
     error: float
     animation: int = 0
+
+
+def check_diagonal(diagonal: float) -> None:
+    """Raise FormatError for a model of infinite size, of which no fraction is a bound."""
+    if not math.isfinite(diagonal):
+        raise FormatError(
+            "nodes are too far apart for an error in percent of the model's size (its diagonal is infinite)"
+        )
 
 
 def curve(

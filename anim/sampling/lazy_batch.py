@@ -12,6 +12,7 @@ from anim.model import Interpolation, TimeAxis, Track
 from anim.sampling.batch import Batch, MixedBatch, rule_of, stack_values
 
 MAX_STACKED_KEYS = 1 << 18  # of the tracks of a batch; of a longer one only those requested are stacked, call by call
+MAX_DIVIDED_VALUES = 1 << 18  # of tracks changed together: of long or wide ones few, for memory
 MAX_MIXED_KEYS = 1 << 15  # of the tracks of an axis, of which a copy with those of other axes pays
 
 
@@ -69,11 +70,11 @@ class LazyBatch:
         return LazyBatch(tuple(compress(self.tracks, chosen.tolist())), self.numbers[chosen], stacked)
 
     def divide(self, keys: int = 0) -> Iterator[LazyBatch]:
-        """Yield some of the tracks at a time: at most MAX_STACKED_KEYS keys, of one track if it has more.
+        """Yield some of the tracks at a time: at most MAX_DIVIDED_VALUES values, of one track if it has more.
 
         keys: number of keys that become of each track, if they are more.
         """
-        size = max(MAX_STACKED_KEYS // max(len(self.time_axis), keys), 1)
+        size = max(MAX_DIVIDED_VALUES // (max(len(self.time_axis), keys) * self.tracks[0].values.shape[1]), 1)
         for first in range(0, len(self.tracks), size):
             part = slice(first, first + size)
             yield LazyBatch(self.tracks[part], self.numbers[part])

@@ -196,7 +196,7 @@ def command(
         began = time.perf_counter()
         outputs.check_paths(input, output)
         with documents.source(input, reporter) as source:
-            optimizer = optimize_job.file_optimizer(
+            optimizer = optimize_job.make_optimizer(
                 source,
                 output,
                 clip=clip or (),

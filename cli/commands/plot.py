@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from enum import StrEnum
 from pathlib import PurePath
 from typing import Annotated
@@ -179,15 +180,20 @@ def _oscillator(omega: float, step: str, kind: str) -> bytes:
     seconds = parse_seconds(step, "--step")
     system = oscillator(omega)
     if omega * seconds > MAX_OMEGA_H:
-        most = f"{MAX_OMEGA_H / omega:.3g} s: --omega times --step is at most {MAX_OMEGA_H:g}"
+        most = f"{_round(MAX_OMEGA_H / omega, ROUND_FLOOR)} s: --omega times --step is at most {MAX_OMEGA_H:g}"
         raise UsageError(f"--step is '{step}' (expected at most {most})")
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     duration = max(NUM_PERIODS * 2 * np.pi / omega, 2 * seconds)
     if duration / seconds > MAX_STEPS:
-        least = f"{duration / MAX_STEPS:.3g} s: {MAX_STEPS} steps in {NUM_PERIODS} periods"
+        least = f"{_round(duration / MAX_STEPS, ROUND_CEILING)} s: {MAX_STEPS} steps in {NUM_PERIODS} periods"
         raise UsageError(f"--step is '{step}' (expected at least {least})")
     runs = compare_integrators(system, x, np.zeros_like(x), step=seconds, duration=duration)
     return stability_plot(Comparison(runs, omega * seconds, seconds, np.array([[0, 1]])), kind=kind)
+
+
+def _round(seconds: float, rounding: str) -> str:
+    """A limit with three digits, itself within the limit."""
+    return f"{float(Context(prec=3, rounding=rounding).create_decimal_from_float(seconds)):.3g}"
 
 
 def _places(files: list[str], *, alone: bool) -> tuple[str, str]:

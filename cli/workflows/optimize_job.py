@@ -15,11 +15,10 @@ from anim.gltf.reading.accessors import Accessors
 from anim.measure.error.surface import diagonal
 from anim.model import Scene
 from anim.operations.selection import Selection
-from anim.optimization.byte_limit import ByteLimit
+from anim.optimization.byte_limit import ByteLimit, ByteLimitError
 from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Bounds, Request
-from anim.optimization.rate_distortion import RatePoint
 from anim.units import format_number, is_zero, plural
 from cli import units
 from cli.errors import CheckError
@@ -32,7 +31,7 @@ from cli.text import Reporter, format_length
 START = "fork" if sys.platform == "linux" else "spawn"  # start method of worker processes
 
 
-def file_optimizer(
+def make_optimizer(
     source: Source, output: str, *, clip: Sequence[str], workers: int, detailed: bool, reporter: Reporter
 ) -> FileOptimizer:
     """Return the optimizer of a source. clip: globs. workers: processes, 0 for one per core.
@@ -55,13 +54,13 @@ def file_optimizer(
         document,
         scene,
         clips,
-        Selection(clip).chosen_clips(reader.names(document)),
-        diagonal(scene),
-        lambda new: documents.write(new, output, source, dry_run=True),
-        workers or _cores(),
-        START,
-        detailed,
-        show_progress,
+        chosen=Selection(clip).chosen_clips(reader.names(document)),
+        scale=diagonal(scene),
+        written_size=lambda new: documents.write(new, output, source, dry_run=True),
+        workers=workers or _cores(),
+        start=START,
+        detailed=detailed,
+        progress=show_progress,
     )
 
 
@@ -75,16 +74,15 @@ def optimize_within(
     """
     if max_bytes is None:
         return request, optimizer.run(request)
-    limit = ByteLimit(optimizer, max_bytes, request, ceiling)
-    found = limit.run()
-    if found.optimized is not None:
-        return found.request, found.optimized
-    assert found.smallest is not None
-    raise _refusal(optimizer, max_bytes, limit.max_error, found.smallest)
+    try:
+        return ByteLimit(optimizer, max_bytes, request, ceiling).run()
+    except ByteLimitError as error:
+        raise _refusal(optimizer, max_bytes, error) from None
 
 
-def _refusal(optimizer: FileOptimizer, max_bytes: int, max_error: float, smallest: RatePoint) -> CheckError:
+def _refusal(optimizer: FileOptimizer, max_bytes: int, error: ByteLimitError) -> CheckError:
     """The error for a limit that nothing meets."""
+    smallest, max_error = error.smallest, error.max_error
     share = 100 * max_error / optimizer.scale if optimizer.scale else math.inf
     percent = f" ({format_number(share, 2)} %)" if math.isfinite(share) else ""
     kept = optimize_report.retained_keys(optimizer.document, optimizer.chosen)

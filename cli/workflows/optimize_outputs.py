@@ -59,7 +59,7 @@ def describe(
     optimizer: FileOptimizer, request: Request, found: Optimized, source: Source, output: str, began: float
 ) -> optimize_report.OptimizeReport:
     """Return the report on an optimization. began: s, when, by `time.perf_counter`."""
-    result, size = optimizer.result(found)
+    result, size = optimizer.choose_document(found)
     return optimize_report.OptimizeReport(
         source.name if output == documents.PIPE else output,
         source.document,

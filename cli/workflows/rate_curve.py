@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from anim.errors import FormatError
 from anim.measure.inspect.storage_cost import animation_bytes
 from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.options import Request
-from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, RatePoint, curve
+from anim.optimization.rate_distortion import ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL, RatePoint, check_diagonal, curve
 from anim.units import format_number
 from cli.errors import UsageError
 from cli.io import documents
@@ -30,10 +28,7 @@ def write_curve(
     optimizer: FileOptimizer, request: Request, path: str, name: str, reporter: Reporter, *, dry_run: bool
 ) -> None:
     """Search with one bound after another, report each size, and write the curve. name: of the file, for the title."""
-    if not math.isfinite(optimizer.scale):
-        raise FormatError(
-            "nodes are too far apart for an error in percent of the model's size (its diagonal is infinite)"
-        )
+    check_diagonal(optimizer.scale)
     points = []
     bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
     for point in curve(optimizer.scale, lambda max_error: optimizer.find_point(request, max_error), bounds):

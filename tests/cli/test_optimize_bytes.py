@@ -117,6 +117,21 @@ def test_equal_clips_stay_equal(tmp_path: Path, call: Call) -> None:
     assert [each["samplers"] for each in clips[:14]] == [each["samplers"] for each in clips[14:28]]
 
 
+@pytest.mark.parametrize("limit", ["100", "100MB"])
+def test_a_model_of_infinite_size_is_refused(limit: str, tmp_path: Path, call: Call) -> None:
+    nodes = [{"name": f"n{i}", "scale": [1e38] * 3, "children": [i + 1]} for i in range(12)]
+    times, turns = ("SCALAR", 5126, [0, 1]), ("VEC4", 5126, [[0, 0, 0, 1], [0, 0, 1, 0]])
+    clip = {
+        "samplers": [{"input": 0, "output": 1}],
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
+    }
+    document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "animations": [clip]}
+    document |= {"nodes": [*nodes, {"name": "end", "translation": [1, 0, 0]}], **buffered(times, turns)}
+    (tmp_path / "in.glb").write_bytes(glb(json.dumps(document).encode()))
+    run = call("optimize", tmp_path / "in.glb", tmp_path / "out.glb", "--max-bytes", limit)
+    assert (run.code, "its diagonal is infinite" in run.err) == (3, True), run.err
+
+
 def test_many_clips_of_a_model_without_size(tmp_path: Path, call: Call) -> None:
     source = tmp_path / "in.glb"
     source.write_bytes(_swaying_clips(13, mesh=False))

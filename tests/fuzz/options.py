@@ -59,9 +59,16 @@ def option_jobs(commands: Sequence[str], seed: int) -> list[Job]:
 
 
 def plain_jobs(commands: Sequence[str] = ()) -> list[Job]:
-    """Return a job for each command line, as it is."""
+    """Return a job for each command line, as it is. commands: "trim", "simulate", "simulate cloth"; all if none.
+
+    Raises SystemExit for one without a command line.
+    """
     found = {" ".join(line): Job(line, each.files) for each in _seeds() for line in _lines(each)}
-    return [job for job in found.values() if not commands or job.line[0] in commands]
+    for each in commands:
+        if not any(line.startswith(f"{each} ") for line in found):
+            raise SystemExit(f"no command line of '{each}'")
+    chosen = tuple(f"{each} " for each in commands or {line.split()[0] for line in found})
+    return [job for line, job in found.items() if line.startswith(chosen)]
 
 
 def _seeds() -> Iterator[Seed]:

@@ -5,6 +5,7 @@ Absurd values of options do too, but with exit code 2 and not 3.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -65,6 +66,12 @@ def test_absurd_values_of_options_end_well(arguments: tuple[str, ...]) -> None:
     pytest.importorskip("rapier3d")
     run = fuzz("--options", *arguments, "--seed", "17")
     assert run.returncode == 0, run.stdout + run.stderr
+    assert sum(map(int, re.findall(r": (\d+)", run.stdout.splitlines()[-1].split("}")[0]))) == int(arguments[-1])
+
+
+def test_a_command_without_options_to_sweep_is_refused() -> None:
+    run = fuzz("--options", "trimm")
+    assert (run.returncode, run.stderr.strip()) == (1, "no command line of 'trimm'")
 
 
 @pytest.mark.slow

@@ -19,8 +19,9 @@ HARMLESS = frozenset(
     KHR_materials_clearcoat KHR_materials_dispersion KHR_materials_emissive_strength KHR_materials_ior
     KHR_materials_iridescence KHR_materials_pbrSpecularGlossiness KHR_materials_sheen KHR_materials_specular
     KHR_materials_transmission KHR_materials_unlit KHR_materials_variants KHR_materials_volume
-    KHR_mesh_quantization KHR_meshopt_compression KHR_node_visibility KHR_texture_basisu KHR_texture_transform
-    KHR_xmp_json_ld VRMC_materials_mtoon VRMC_node_constraint VRMC_springBone VRMC_vrm VRMC_vrm_animation
+    KHR_implicit_shapes KHR_mesh_quantization KHR_meshopt_compression KHR_node_visibility KHR_physics_rigid_bodies
+    KHR_texture_basisu KHR_texture_transform
+    KHR_xmp_json_ld VRM VRMC_materials_mtoon VRMC_node_constraint VRMC_springBone VRMC_vrm VRMC_vrm_animation
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
 
@@ -32,6 +33,7 @@ _PLAIN = frozenset(
 )
 _CONTAINERS = (dict, list)  # of JSON
 _SCALARS = frozenset({str, int, float, bool, type(None)})  # a lookup is half as long as isinstance
+MAX_PROPERTIES = 64  # of objects that are looked at property by property
 _Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its parent's, and its key or index there
 
 
@@ -158,15 +160,23 @@ def unknown_extensions(json: Json) -> list[tuple[str, Any]]:
 def _has_extensions(values: list[Any]) -> bool:
     """Return False if there are no extensions in these values, at any depth.
 
-    By property over all values, in a third of the time of a walk: the long arrays of most files have none.
+    By property over all values, in a third of the time of a walk: the long arrays of most files have none. True also
+    where types are mixed or properties many, which a walk finds out.
     """
-    kinds = set(map(type, values))
-    if kinds == {list}:
-        return _has_extensions([*chain.from_iterable(values)])
-    if kinds != {dict}:
-        return not kinds <= _SCALARS  # of mixed types: there may be some
-    keys = set(chain.from_iterable(values)) - _PLAIN - {"extras"}
-    return "extensions" in keys or any(_has_extensions([each[key] for each in values if key in each]) for key in keys)
+    columns = [values]
+    while columns:
+        column = columns.pop()
+        kinds = set(map(type, column))
+        if kinds == {list}:
+            columns.append([*chain.from_iterable(column)])
+        elif kinds == {dict}:
+            keys = set(chain.from_iterable(column)) - _PLAIN - {"extras"}
+            if "extensions" in keys or len(keys) > MAX_PROPERTIES:
+                return True
+            columns += [[each[key] for each in column if key in each] for key in keys]
+        elif not kinds <= _SCALARS:
+            return True
+    return False
 
 
 def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str, Any]]) -> None:

@@ -15,7 +15,7 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Track
 from anim.model.track import BYTE_UNIT_TOLERANCE
 
-MAX_STACKED_KEYS = 1 << 18  # of a clip's rotations, looked at together
+MAX_STACKED_KEYS = 1 << 18  # of rotations that are looked at together
 
 
 def normalize_new(document: Document, clips: Mapping[int, Clip]) -> Mapping[int, Clip]:
@@ -58,11 +58,17 @@ def _normalize(clip: Clip, number: int, off: list[int], before: set[tuple[int | 
 
 
 def _non_unit_tracks(clip: Clip, chosen: Iterable[int]) -> list[int]:
-    """The chosen tracks of a clip with non-unit rotations, in one array if they are short: there can be many."""
-    rotations = [n for n in chosen if clip.tracks[n].path == "rotation"]
-    counts = [len(clip.tracks[n].times) for n in rotations]
-    parts = [rotations] if sum(counts) <= MAX_STACKED_KEYS else [[n] for n in rotations]
-    return [n for part in parts if part for n in _non_unit_part(clip, part)]
+    """The chosen tracks of a clip with non-unit rotations, many in one array: there can be thousands of short ones."""
+    parts: list[list[int]] = []
+    room = 0
+    for n in chosen:
+        if clip.tracks[n].path == "rotation":
+            if room <= 0:
+                parts.append([])
+                room = MAX_STACKED_KEYS
+            parts[-1].append(n)
+            room -= len(clip.tracks[n].times)
+    return [n for part in parts for n in _non_unit_part(clip, part)]
 
 
 def _non_unit_part(clip: Clip, rotations: list[int]) -> list[int]:

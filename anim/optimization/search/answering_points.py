@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -92,17 +91,18 @@ def _lowest_carried(joints: Ints, weights: Floats, first: Ints, end: Ints, paren
     some = np.flatnonzero(faint.sum(axis=1) > 1)
     if not len(some):
         return at, point
-    pairs = np.array(list(combinations(range(joints.shape[1]), 2)))
-    both = faint[some][:, pairs].all(axis=-1)
-    row, pair = np.nonzero(both)
-    low, high = np.sort(joints[some[row, None], pairs[pair]], axis=1).T
-    above = _lowest_common(low, high, first, parents)
+    own, share = joints[some], weights[some]
+    places = np.sort(np.where(faint[some], own, len(first)), axis=1)
+    row, place = np.nonzero(places[:, 1:] < len(first))  # nodes above several are those above two next to each other
+    above = _lowest_common(places[row, place], places[row, place + 1], first, parents)
     row, above = row[above >= 0], above[above >= 0]
     last = np.empty_like(end)
     last[first] = end
-    own, share = joints[some[row]], weights[some[row]]
-    together = (share * ((above[:, None] <= own) & (own < last[above][:, None]))).sum(axis=1) > CARRIED
-    return np.append(at, above[together]), np.append(point, some[row[together]])
+    together = np.zeros(len(row))
+    for i in range(joints.shape[1]):  # in their order: all at once would take memory
+        together += share[row, i] * ((above <= own[row, i]) & (own[row, i] < last[above]))
+    is_carried = together > CARRIED
+    return np.append(at, above[is_carried]), np.append(point, some[row[is_carried]])
 
 
 def _lowest_common(low: Ints, high: Ints, first: Ints, parents: Ints) -> Ints:

@@ -271,13 +271,13 @@ def _radius(size: str, scene: Scene) -> float:
     Raises UsageError for one that no file can have, DataRangeError where that is the model's fault: without a size, or
     beyond all numbers.
     """
-    whole = diagonal(scene)
-    radius = units.parse_length(size, "--size", lambda: whole)
+    radius = units.parse_length(size, "--size", lambda: diagonal(scene))
     if MIN_SIZE_M <= radius <= MAX_SIZE_M:
         return radius
     expected = f"(expected {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m)"
     if not size.rstrip().endswith("%"):
         raise UsageError(f"--size is '{size}' {expected}")
+    whole = diagonal(scene)
     problem = f"--size is {size} of the model, whose diagonal is {whole:.3g} m {expected}"
     error = UsageError if MIN_SIZE_M <= whole <= MAX_SIZE_M else DataRangeError
     raise error(problem, help="choose --size, such as 2cm")

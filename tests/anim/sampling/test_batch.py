@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats, Ints
-from anim.model import TimeAxis
+from anim.model import TimeAxis, Track
 from anim.sampling import batch as module
 from anim.sampling import lazy_batch, sample_pose
 from anim.sampling.batch import MixedBatch, concatenate
@@ -110,6 +110,18 @@ def test_tracks_lie_one_after_the_other_with_their_tangents() -> None:
 
 def test_no_tracks_are_no_groups() -> None:
     assert concatenate([]) == []
+
+
+def test_tracks_are_divided_by_their_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wide ones, and those that become longer, fewer at a time; each once."""
+    monkeypatch.setattr(lazy_batch, "MAX_DIVIDED_VALUES", 100)
+    for width, keys, size in ((4, 0, 5), (20, 0, 1), (4, 10, 2), (300, 0, 1)):
+        axis = TimeAxis(np.arange(5.0))
+        tracks = [Track(i, "weights", "LINEAR", axis, np.zeros((5, width))) for i in range(7)]
+        (lazy,) = lazy_batch.lazy_batches(tracks)
+        parts = list(lazy.divide(keys))
+        assert [len(part.tracks) for part in parts] == [size] * (7 // size) + [7 % size] * bool(7 % size)
+        assert [n for part in parts for n in part.numbers.tolist()] == list(range(7))
 
 
 @pytest.mark.parametrize("most", [1, 9, 40, 10**6])

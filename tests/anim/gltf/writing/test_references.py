@@ -37,6 +37,7 @@ PRIMITIVE: Json = {"attributes": {}}
         ({"scenes": [{"extensions": {"ACME": [[6]]}}]}, {6}, {6}),
         ({"extensions": {"KHR_lights_punctual": {"lights": [{"range": 5}]}}}, set(), set()),
         ({"extensions": {"VRMC_vrm": {"humanoid": {"humanBones": {"hips": {"node": 1}}}}}}, set(), set()),
+        ({"extensions": {"VRM": {"meta": {"texture": 1}, "secondaryAnimation": {"boneGroups": []}}}}, set(), set()),
         ({"textures": [{"source": 1, "extensions": {"KHR_texture_basisu": {"source": 2}}}]}, set(), set()),
         ({"asset": {"version": "2.0", "extras": 7}}, set(), set()),
         ({"nodes": [{"extensions": {"EXT_mesh_gpu_instancing": {"attributes": {}, "extras": 1}}}]}, set(), set()),
@@ -94,3 +95,16 @@ def test_extensions_naming_keys(extension: Json, places: list[str]) -> None:
         "extras": 1,
     }
     assert references.extensions_naming_keys(json, [0]) == places
+
+
+def test_extensions_among_many_properties_are_found() -> None:
+    """Of thousands of objects with one of its own each, in linear time; and hundreds of levels deep."""
+    nodes: list[Any] = [{"foo": {f"k{i}": i}} for i in range(20_000)]
+    assert references.unknown_extensions({"nodes": nodes}) == []
+    nodes[7]["foo"] = {"extensions": {"ACME": 1}}
+    assert references.unknown_extensions({"nodes": nodes}) == [("/nodes/7/foo/extensions/ACME", 1)]
+    deep: dict[str, Any] = {"extensions": {"ACME": 1}}
+    for _ in range(400):
+        deep = {"foo": deep}
+    ((place, content),) = references.unknown_extensions({"nodes": [deep]})
+    assert (place, content) == (f"/nodes/0{'/foo' * 400}/extensions/ACME", 1)

@@ -55,12 +55,13 @@ def test_points_of_every_node(seed: int, width: int, monkeypatch: pytest.MonkeyP
         assert found.largest(values, range(NODES)).tolist() == most
 
 
+@pytest.mark.parametrize("width", [3, 8, 24])
 @pytest.mark.parametrize("seed", range(4))
-def test_points_of_many_faint_weights(seed: int) -> None:
-    """Eight joints of a point of which none is noticeable alone, some of them the same; in several trees."""
-    points, parents = random_case(seed, 8)
+def test_points_of_many_faint_weights(seed: int, width: int) -> None:
+    """Joints of a point of which none is noticeable alone, some of them the same; in several trees."""
+    points, parents = random_case(seed, width)
     factors = points.factors.copy()
-    factors[..., 3] = np.random.default_rng(seed).choice([0, 0.03, 0.06, CARRIED], size=(POINTS, 8))
+    factors[..., 3] = np.random.default_rng(seed).choice([0, 0.03, 0.06, CARRIED], size=(POINTS, width))
     points = PointMatrix(points.nodes, points.joints, factors)
     expected = [points_on(points, parents, node) for node in range(NODES)]
     assert found_points(AnsweringPoints(points, parents), POINTS, NODES) == expected
