@@ -67,7 +67,8 @@ def command(
         typer.Option(
             "--max-bytes",
             metavar="N",
-            help="Maximum file size, like 800kB: the smallest error found that fits, up to --max-error if given.",
+            help="Maximum file size, like 800kB: the smallest error found that fits, up to --max-error if given, "
+            "else 10 % of the model's size.",
         ),
     ] = None,
     meshopt: Annotated[

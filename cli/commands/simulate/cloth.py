@@ -174,6 +174,8 @@ def command(
         )
         registry.check_frames(ending, options.num_frames, _num_vertices(scene, node), writing)
         pinned = _pinned(document, scene, node, cloth, pin)
+        if not pinned.any():
+            reporter.warn("no vertex is pinned: all of the mesh falls (--pin or --cloth keeps some)")
         announce_compiling(reporter)
         try:
             run = simulate_cloth(scene, driver, node, pinned, options)
