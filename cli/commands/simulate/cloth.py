@@ -174,8 +174,6 @@ def command(
         )
         registry.check_frames(ending, options.num_frames, _num_vertices(scene, node), writing)
         pinned = _pinned(document, scene, node, cloth, pin)
-        if not pinned.any():
-            reporter.warn("no vertex is pinned: all of the mesh falls (--pin or --cloth keeps some)")
         announce_compiling(reporter)
         try:
             run = simulate_cloth(scene, driver, node, pinned, options)
@@ -204,8 +202,10 @@ def command(
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     reporter.info(
-        f"{name}  {text.format_bytes(saved.size)}, {_summary(run, substeps)}, {took}{' (dry run)' if dry_run else ''}"
+        f"{name}  {text.format_bytes(saved.size)}, {_summary(run, substeps)}, {took}{' (dry run: nothing written)' if dry_run else ''}"
     )
+    if not pinned.any():
+        reporter.warn("no vertex is pinned: all of the mesh falls (--pin or --cloth keeps some)")
     if run.report.advice:
         reporter.warn(run.report.advice)
 
