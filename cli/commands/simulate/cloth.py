@@ -201,9 +201,8 @@ def command(
     saved.report(reporter)
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
-    reporter.info(
-        f"{name}  {text.format_bytes(saved.size)}, {_summary(run, substeps)}, {took}{' (dry run: nothing written)' if dry_run else ''}"
-    )
+    dry = " (dry run: nothing written)" if dry_run else ""
+    reporter.info(f"{name}  {text.format_bytes(saved.size)}, {_summary(run, substeps)}, {took}{dry}")
     if not pinned.any():
         reporter.warn("no vertex is pinned: all of the mesh falls (--pin or --cloth keeps some)")
     if run.report.advice:
