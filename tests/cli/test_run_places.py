@@ -44,10 +44,17 @@ def test_no_link_leads_an_output_elsewhere(link: str, target: str, words: str, t
     assert {each.name for each in tmp_path.iterdir()} == {"project"}
 
 
-def test_an_output_is_no_file_that_a_step_reads(folder: Path, call: Call) -> None:
+def test_an_output_is_no_file_that_its_own_steps_read(folder: Path, call: Call) -> None:
     write_recipe(folder, "from-euler --onto build/take.glb", match="*.bvh", out="build/{stem}.glb")
     (folder / "take.bvh").write_text("HIERARCHY")
-    assert "is the input 'build/take.glb'" in refusal(call("run"), 2)
+    assert "is a file that its own steps read" in refusal(call("run"), 2)
+
+
+def test_a_step_may_read_what_another_recipe_makes(folder: Path, call: Call) -> None:
+    write_recipe(folder, PLAIN)
+    write_recipe(folder, "from-euler --onto 'build/crowd/arm 1.glb'", match="*.bvh", out="build/{stem}.glb")
+    (folder / "take.bvh").write_text("HIERARCHY")
+    assert "2 files: 1 made, 1 failed" in call("run", "--jobs", "1").err  # the .bvh is none
 
 
 def test_a_link_made_during_the_run_is_found_before_writing(folder: Path) -> None:

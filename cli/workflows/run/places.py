@@ -6,9 +6,11 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from anim.errors import FormatError, OutputError
+
+RealPath: TypeAlias = Callable[[str], str]  # a path without links
 
 if TYPE_CHECKING:  # which imports this module
     from cli.workflows.run.job import Job
@@ -17,14 +19,19 @@ if TYPE_CHECKING:  # which imports this module
 def clashes(jobs: Sequence[Job]) -> Iterator[str]:
     """Yield the problems of outputs that links lead elsewhere: to an input, to another output, or out of the folder.
 
-    Names alone don't show it: with a link `build` to ".", "build/a.glb" is "a.glb".
+    Names alone don't show it: with a link `build` to ".", "build/a.glb" is "a.glb". A file of another job's steps may
+    be an output by its name: one recipe makes what the next one reads.
     """
-    folder_of = cache(os.path.realpath)  # many files have few folders
-    read = {_real(job.folder / name, folder_of): name for job in jobs for name in _inputs(job)}
+    real_of = _real_paths()
+    outputs = {job.output for job in jobs}
+    names = dict.fromkeys((job.folder, name) for job in jobs for name in _inputs(job))  # in order, for messages
+    read = {
+        real_of(os.path.join(folder, name)): name for folder, name in names if os.path.normpath(name) not in outputs
+    }
     made = dict[str, str]()
     for job in jobs:
-        real = _real(job.folder / job.output, folder_of)
-        if problem := _problem(job, real, _real(job.folder / job.input, folder_of), folder_of(job.folder)):
+        real = real_of(os.path.join(job.folder, job.output))
+        if problem := _problem(job, real_of):
             yield problem
         elif real in read:
             yield f"'{job.output}', the output of '{job.input}', is the input '{read[real]}'"
@@ -34,8 +41,7 @@ def clashes(jobs: Sequence[Job]) -> Iterator[str]:
 
 def check_output(job: Job) -> None:
     """Raise OutputError if the output isn't where a job may write; asked again before writing: links may be new."""
-    real, own, folder = (os.path.realpath(job.folder / name) for name in (job.output, job.input, ""))
-    if problem := _problem(job, real, own, folder):
+    if problem := _problem(job, os.path.realpath):
         raise OutputError(problem)
 
 
@@ -57,15 +63,25 @@ def _inputs(job: Job) -> Iterator[str]:
         yield from step.files
 
 
-def _problem(job: Job, real: str, own: str, folder: str) -> str:
-    """What is wrong with an output; real, own: output and input without links."""
-    if real == own:
+def _problem(job: Job, real_of: RealPath) -> str:
+    """What is wrong with the output of a job, by its own files."""
+    real = real_of(os.path.join(job.folder, job.output))
+    if real == real_of(os.path.join(job.folder, job.input)):
         return f"'{job.input}' is its own output ('{job.output}' is a link to it, or below one)"
-    if not Path(real).is_relative_to(folder):
+    if real in (real_of(os.path.join(job.folder, name)) for name in _inputs(job)):
+        return f"'{job.output}', the output of '{job.input}', is a file that its own steps read"
+    if not real.startswith(os.path.join(real_of(str(job.folder)), "")):
         return f"'{job.output}' leads out of the folder of the settings, by a link"
     return f"'{job.output}' is no regular file" if is_special(real) else ""
 
 
-def _real(path: Path, folder_of: Callable[[str | Path], str]) -> str:
-    """The path without links."""
-    return os.path.realpath(path) if os.path.islink(path) else os.path.join(folder_of(path.parent), path.name)
+def _real_paths() -> RealPath:
+    """A function that follows links as `os.path.realpath`, which looks up folders once: many files have few."""
+    folder_of = cache(os.path.realpath)
+
+    @cache
+    def real_of(path: str) -> str:
+        folder, name = os.path.split(path)
+        return os.path.realpath(path) if os.path.islink(path) else os.path.join(folder_of(folder), name)
+
+    return real_of
