@@ -1,4 +1,4 @@
-"""Where the files of a run really are: a link must lead no output to an input, nor out of the folder."""
+"""Real places of the files of a run: a link must lead no output to an input, nor out of the folder."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _inputs(job: Job) -> Iterator[str]:
 
 
 def _problem(job: Job, real_of: RealPath) -> str:
-    """What is wrong with the output of a job, by its own files."""
+    """Problem of the output of a job by its own files, empty without any."""
     real = real_of(os.path.join(job.folder, job.output))
     if real == real_of(os.path.join(job.folder, job.input)):
         return f"'{job.input}' is its own output ('{job.output}' is a link to it, or below one)"
