@@ -129,7 +129,8 @@ def command(
     if emit is not None:
         readable, code = readable_jobs(planned)
         if readable:
-            documents.write_text(SCRIPTS[emit.value](readable))
+            script = SCRIPTS[emit.value](readable)
+            documents.write_text(script.encode(errors="surrogateescape"))  # bytes of names that are not UTF-8
         return code
     results = caching.ResultCache(folder)
     results.prepare()

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
+import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from anim.errors import FormatError, UnsupportedError
 from cli.errors import UsageError
 from cli.tables import cut_middle
 
@@ -16,6 +19,8 @@ NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
 Keys: TypeAlias = Mapping[str, type | tuple[type, ...]]  # allowed keys, and the types of their values
 TYPE_NAMES = {str: "text", bool: "true or false", int: "a whole number", list: "a list", dict: "a table"}
 MAX_INTEGER = 2**63 - 1  # of TOML
+MAX_BYTES = 10_000_000  # of settings, which people write
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0)  # for the writer of a pipe
 SECTIONS: Keys = {"check": dict, "budget": list, "recipe": list}
 
 
@@ -59,14 +64,16 @@ def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
 def _table(path: Path) -> dict[str, Any] | None:
     """The settings in a file, None if it has none."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        content = tomllib.loads(_read(path).decode("utf-8-sig").replace("\r\n", "\n"))
     except FileNotFoundError:
         return None
+    except OSError as error:
+        raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})", where=str(path)) from None
     except RecursionError:
         raise UsageError(f"{path}: is nested too deep") from None
     except UnicodeDecodeError as error:
         raise UsageError(f"{path}: is no TOML: byte {error.start} is not UTF-8") from None
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path}: {error}") from None
     except ValueError:  # Python's limit of digits
         raise UsageError(f"{path}: has a whole number of thousands of digits (TOML has 64 bits)") from None
@@ -81,6 +88,20 @@ def _table(path: Path) -> dict[str, Any] | None:
     except RecursionError:
         raise UsageError(f"{path}: is nested too deep") from None
     return table
+
+
+def _read(path: Path) -> bytes:
+    """The bytes of a regular file: a pipe would be waited for, and a device may never end.
+
+    Raises FileNotFoundError, OSError, FormatError, and UnsupportedError for more than MAX_BYTES.
+    """
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | _NO_WAIT)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise FormatError("is no regular file", where=str(path))
+        data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise UnsupportedError(f"has more than {MAX_BYTES / 1e6:.0f} MB (settings are short)", where=str(path))
+    return data
 
 
 def _check_integers(path: Path, where: str, value: object) -> None:

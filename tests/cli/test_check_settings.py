@@ -65,6 +65,34 @@ def test_sources_of_budgets_are_regular_files(against: str, folder: Path, call: 
     assert words.get(against, "is no regular file") in run.err
 
 
+@pytest.mark.parametrize(
+    ("kind", "code", "words"),
+    [
+        ("fifo", 3, "is no regular file"),
+        ("/dev/zero", 3, "is no regular file"),
+        ("folder", 3, "can't be read (is a directory)"),
+        ("gltf-anim.toml", 3, "can't be read (too many levels of symbolic links)"),
+        ("long", 4, "has more than 10 MB"),
+    ],
+)
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_settings_are_a_short_regular_file(
+    command: str, kind: str, code: int, words: str, folder: Path, call: Call
+) -> None:
+    """A pipe was waited for, and a device was read until memory ended."""
+    path = folder / "gltf-anim.toml"
+    if kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "long":
+        path.write_bytes(b"#" * 10_000_001)
+    else:
+        path.symlink_to(kind)
+    assert f"gltf-anim.toml: {words}" in refusal(call(command, "noop.glb"), code)
+    assert f"gltf-anim.toml: {words}" in refusal(call(command, "noop.glb", "--config", path), code)
+
+
 def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> None:
     (folder / "gltf-anim.toml").write_text("[check]\n")
     (folder / "pyproject.toml").write_text("[tool.gltf-anim]\n")

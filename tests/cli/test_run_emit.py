@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -58,6 +59,47 @@ def test_make_refuses_names_that_it_can_not_have(folder: Path, call: Call) -> No
     assert "'build/crowd/100%.glb': make has no names with '%'" in refusal(run, 2)
     assert help_line(run) == "--emit ninja or shell"
     assert "crowd/100%.glb" in call("run", "--emit", "shell").text
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_names_that_look_like_options_remain_names(tool: str, folder: Path, call: Call) -> None:
+    if shutil.which(TOOLS[tool][0]) is None:
+        pytest.skip(f"{TOOLS[tool][0]} is not installed")
+    (folder / "crowd/arm 1.glb").rename(folder / "-x.glb")
+    write_recipe(folder, "resample --fps 12", match="-*.glb", out="{stem}.small.glb")
+    (folder / "script").write_bytes(call("run", "--emit", tool).product())
+    subprocess.run([*TOOLS[tool], "script"], cwd=folder, env=ENVIRONMENT, check=True, capture_output=True)
+    assert (folder / "-x.small.glb").is_file()
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a|b"])
+def test_ninja_refuses_names_that_it_can_not_have(name: str, folder: Path, call: Call) -> None:
+    """Without an escape the rest of the name was read as another line, or as another file."""
+    (folder / "crowd/arm 1.glb").rename(folder / f"crowd/{name}.glb")
+    write_recipe(folder, "resample --fps 12")
+    run = call("run", "--emit", "ninja")
+    assert f"ninja has no names with {name[1]!r}" in refusal(run, 2)
+    assert help_line(run) == "--emit shell"
+
+
+@pytest.mark.parametrize("tool", ["make", "ninja"])
+@pytest.mark.parametrize("name", ["arm", "arm 1"])
+def test_line_breaks_of_steps_begin_no_line_of_a_rule(name: str, tool: str, folder: Path, call: Call) -> None:
+    (folder / "crowd/arm 1.glb").rename(folder / f"crowd/{name}.glb")
+    write_recipe(folder, "resample --fps 12 --clip 'a*\n\ttouch made'")
+    assert "a step has a line break" in refusal(call("run", "--emit", tool), 2)
+    assert "touch made" in call("run", "--emit", "shell").text
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_names_that_are_no_utf8_keep_their_bytes(tool: str, folder: Path, call: Call) -> None:
+    path = os.fsencode(folder / "crowd") + b"/a\xff.glb"
+    try:
+        os.rename(folder / "crowd/arm 1.glb", path)
+    except OSError:
+        pytest.skip("file names are UTF-8 here")
+    write_recipe(folder, "resample --fps 12")
+    assert b"build/crowd/a\xff.glb" in call("run", "--emit", tool).product()
 
 
 def test_images_that_a_pipe_would_lose_are_refused(folder: Path, call: Call) -> None:

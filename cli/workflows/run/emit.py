@@ -22,7 +22,8 @@ from cli.workflows.run.steps import EDITING, Step
 HEADER = f"# made by `{PROGRAM} run --emit`"
 IN_BASH = '[ -n "${BASH_VERSION-}" ] || exec bash "$0"  # for bash: `sh` has no pipefail everywhere'
 EMBED = "--embed"
-NOT_IN_MAKE = "\t\n\r%;=*?[]~\\|&"  # in a rule they mean something, and an escape does not hold everywhere
+NOT_IN_MAKE = "\t\n\v\f\r%;=*?[]~\\|&"  # in a rule they mean something, and an escape does not hold everywhere
+NOT_IN_NINJA = "\n\r|"  # it has no escape for them
 Escape: TypeAlias = Callable[[str], str]  # of a text in a rule
 
 
@@ -51,18 +52,19 @@ def makefile(jobs: Sequence[Job]) -> str:
 
 def ninja_file(jobs: Sequence[Job]) -> str:
     """Return rules and builds for ninja, to be used in the folder of the settings."""
-    rules: dict[tuple[tuple[Step, ...], bool], str] = {}
+    rules: dict[tuple[tuple[Step, ...], bool, str, str], str] = {}
     builds = []
     for job in jobs:
         _check_images(job)
-        name = rules.setdefault((job.steps, _is_text(job)), f"recipe{len(rules) + 1}")
+        key = (job.steps, _is_text(job), _variable_in_ninja("$in", job.input), _variable_in_ninja("$out", job.output))
+        name = rules.setdefault(key, f"recipe{len(rules) + 1}")
         output, *inputs = (_in_ninja(each) for each in (job.output, job.input, *_other_inputs(job)))
         implicit = f" | {' '.join(inputs[1:])}" if inputs[1:] else ""
         builds.append(f"build {output}: {name} {inputs[0]}{implicit}\n")
     texts = []
-    for (steps, is_text), name in rules.items():
+    for (steps, is_text, input, output), name in rules.items():
         job = Job(jobs[0].folder, "", "x.gltf" if is_text else "x.glb", steps)
-        command = _pipeline(job, "$in", "$out", escape=lambda text: text.replace("$", "$$"))
+        command = _pipeline(job, input, output, escape=_one_line)
         texts.append(f"rule {name}\n  command = {command}\n  description = $out\n")
     return "\n".join([HEADER, *texts, *builds])
 
@@ -132,23 +134,41 @@ def _check_images(job: Job) -> None:
 
 def _make_commands(job: Job) -> list[str]:
     """Lines of a rule, with automatic variables if the names need no escapes."""
-    if re.search("[ '#:]", job.input + job.output):
+    if any(re.search("^-|[ '#:]", name) for name in (job.input, job.output)):
         folder = shlex.quote(PurePosixPath(job.output).parent.as_posix())
         command = _pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output)))
-        return [each.replace("$", "$$") for each in (f"@mkdir -p -- {folder}", command)]
-    return ["@mkdir -p '$(@D)'", _pipeline(job, "'$<'", "'$@'", escape=lambda text: text.replace("$", "$$"))]
+        return [_one_line(each) for each in (f"@mkdir -p -- {folder}", command)]
+    return ["@mkdir -p '$(@D)'", _pipeline(job, "'$<'", "'$@'", escape=_one_line)]
+
+
+def _one_line(command: str) -> str:
+    """A command, or words of one, as text of a rule. Raises UsageError for a line break, which would end the rule."""
+    if re.search(r"[\n\r]", command):
+        raise UsageError(f"a step has a line break, which make and ninja can't have: {command}", help="--emit shell")
+    return command.replace("$", "$$")
 
 
 def _in_make(name: str) -> str:
     """A name as a target or prerequisite."""
-    found = next((c for c in name if c in NOT_IN_MAKE), "")
-    if found:
-        raise UsageError(f"'{name}': make has no names with {found!r}", help="--emit ninja or shell")
+    _check_name(name, NOT_IN_MAKE, "make", "--emit ninja or shell")
     return re.sub(r"([ #:])", r"\\\1", name).replace("$", "$$")
 
 
 def _in_ninja(name: str) -> str:
+    """A name as an output or input of a build."""
+    _check_name(name, NOT_IN_NINJA, "ninja", "--emit shell")
     return name.replace("$", "$$").replace(" ", "$ ").replace(":", "$:")
+
+
+def _variable_in_ninja(variable: str, name: str) -> str:
+    """The variable for a name in a command: ninja takes "./" from a name, without which "-x.glb" is an option."""
+    return f"./{variable}" if name.startswith("-") else variable
+
+
+def _check_name(name: str, refused: str, tool: str, help: str) -> None:
+    found = next((c for c in name if c in refused), "")
+    if found:
+        raise UsageError(f"'{name}': {tool} has no names with {found!r}", help=help)
 
 
 SCRIPTS: Mapping[str, Callable[[Sequence[Job]], str]] = {"shell": shell_script, "ninja": ninja_file, "make": makefile}

@@ -25,6 +25,7 @@ from cli.reports import image_notes
 from cli.streams import StepStreams, use_streams
 from cli.text import Reporter
 from cli.workflows.run.cache import FileHashes, ResultCache
+from cli.workflows.run.places import check_output
 from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 from cli.workflows.run.steps import Step
 
@@ -145,6 +146,7 @@ def write_output(job: Job, product: Bytes) -> int:
 
     The same bytes are not written again. Raises AnimError.
     """
+    check_output(job)
     path = job.folder / job.output
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

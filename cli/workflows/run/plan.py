@@ -11,6 +11,7 @@ from anim.gltf.io import container
 from cli.errors import UsageError
 from cli.io import input_files
 from cli.workflows.check_config import matches
+from cli.workflows.run import places
 from cli.workflows.run.job import Job
 from cli.workflows.run.outputs import OutputRecord
 from cli.workflows.run.recipe import Recipe, RecipeBook
@@ -59,6 +60,9 @@ def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
             raise UsageError(f"{path}: matches no recipe of {book.path}", help="--recipe NAME chooses one for any file")
     if not jobs:
         raise NotFoundError(f"{book.path}: no recipe matches a file")
+    for problem in places.clashes(jobs):
+        raise UsageError(f"{book.path}: {problem}", help="out names files in a folder of their own")
+    places.check_regular(book.folder, used | {name for job in jobs for step in job.steps for name in step.files})
 
 
 def _relative(book: RecipeBook, path: str) -> str:
@@ -77,7 +81,9 @@ def _files(book: RecipeBook, recipe: Recipe) -> Iterator[str]:
         prefix = "" if relative == "." else f"{relative}/"
         folders[:] = sorted(each for each in folders if not each.startswith(".") and prefix + each != outputs)
         for name in sorted(names):
-            if not name.startswith(".") and (not is_gltf or name.lower().endswith(container.SUFFIXES)):
+            if name.startswith(".") or (is_gltf and not name.lower().endswith(container.SUFFIXES)):
+                continue
+            if not places.is_special(os.path.join(folder, name)):  # as `check` leaves pipes and devices out
                 yield prefix + name
 
 

@@ -89,6 +89,8 @@ def _check_complete(where: str, entry: Mapping[str, Any]) -> None:
         if not entry.get(key):
             raise UsageError(f"{where}: has no {key}")
     for key in ("match", "out"):
+        if "\0" in entry[key]:
+            raise UsageError(f"{where}: {key} has a null character (no file name has one)")
         if PurePosixPath(entry[key]).is_absolute() or ".." in PurePosixPath(entry[key]).parts:
             problem = f"{key} is '{entry[key]}' (expected a path below the folder of the settings)"
             raise UsageError(f"{where}: {problem}")
@@ -97,6 +99,8 @@ def _check_complete(where: str, entry: Mapping[str, Any]) -> None:
 def _step(words: Any, number: int, where: str) -> Step:
     if not isinstance(words, str):
         raise UsageError(f'{where} is no text (expected a command line, like "resample --fps 30")')
+    if "\0" in words:
+        raise UsageError(f"{where} has a null character (no command line has one)")
     try:
         return parse_step(words, is_first=number == 1)
     except UsageError as error:

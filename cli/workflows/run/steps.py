@@ -105,7 +105,7 @@ def _check_kind(words: list[str], group: Any) -> None:
 
 
 def _parsed(command: Any, step: Step, context: Any) -> dict[str, Any]:
-    """Values of the command's parameters."""
+    """Values of the command's parameters, without those of files that the step does not name."""
     name = step.command[-1]
     try:
         with use_streams(StepStreams("", np.empty(0, np.uint8), Path())):  # for the text of --help
@@ -115,14 +115,22 @@ def _parsed(command: Any, step: Step, context: Any) -> dict[str, Any]:
     except TyperException as error:
         problem, hint = usage_problem(error)
         raise UsageError(problem, help=hint) from None
-    return {**parsed.params, "depfile": parsed.meta.get(DEPFILE)}
+    arguments = {each.name for each in command.params if each.param_type_name == "argument"}
+    given = {
+        name: value
+        for name, value in parsed.params.items()
+        if name not in arguments or parsed.get_parameter_source(name).name == "COMMANDLINE"
+    }
+    return {**given, "depfile": parsed.meta.get(DEPFILE)}
 
 
 def _check_values(command: Any, step: Step, values: dict[str, Any]) -> None:
     """Raise UsageError for names of files, and for options that no step can have."""
     for each in command.params:
-        if each.param_type_name == "argument" and values[each.name] and values[each.name] != PIPE:
-            problem = f"{step.label}: '{values[each.name]}' is a file (expected options: the recipe has the files)"
+        if each.param_type_name == "argument" and values.get(each.name):
+            file = values[each.name]
+            name = file if isinstance(file, str) else file[0]
+            problem = f"{step.label}: '{name}' is a file (expected options: the recipe has the files)"
             raise UsageError(problem)
         if each.name in REFUSED and values.get(each.name) not in (None, False):
             raise UsageError(f"{step.label}: {max(each.opts, key=len)} {REFUSED[each.name]}: leave it out of a step")

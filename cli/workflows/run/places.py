@@ -1,0 +1,87 @@
+"""Real places of the files of a run: a link must lead no output to an input, nor out of the folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from anim.errors import FormatError, OutputError
+
+RealPath: TypeAlias = Callable[[str], str]  # a path without links
+
+if TYPE_CHECKING:  # which imports this module
+    from cli.workflows.run.job import Job
+
+
+def clashes(jobs: Sequence[Job]) -> Iterator[str]:
+    """Yield the problems of outputs that links lead elsewhere: to an input, to another output, or out of the folder.
+
+    Names alone don't show it: with a link `build` to ".", "build/a.glb" is "a.glb". A file of another job's steps may
+    be an output by its name: one recipe makes what the next one reads.
+    """
+    real_of = _real_paths()
+    outputs = {job.output for job in jobs}
+    names = dict.fromkeys((job.folder, name) for job in jobs for name in _inputs(job))  # in order, for messages
+    read = {
+        real_of(os.path.join(folder, name)): name for folder, name in names if os.path.normpath(name) not in outputs
+    }
+    made = dict[str, str]()
+    for job in jobs:
+        real = real_of(os.path.join(job.folder, job.output))
+        if problem := _problem(job, real_of):
+            yield problem
+        elif real in read:
+            yield f"'{job.output}', the output of '{job.input}', is the input '{read[real]}'"
+        elif made.setdefault(real, job.output) != job.output:
+            yield f"'{job.output}' and '{made[real]}' are the same output"
+
+
+def check_output(job: Job) -> None:
+    """Raise OutputError if the output isn't where a job may write; asked again before writing: links may be new."""
+    if problem := _problem(job, os.path.realpath):
+        raise OutputError(problem)
+
+
+def check_regular(folder: Path, names: Iterable[str]) -> None:
+    """Raise FormatError for a pipe or device among the inputs: one that never ends would be read for its hash."""
+    for name in names:
+        if is_special(folder / name):
+            raise FormatError("is no regular file", where=name)
+
+
+def is_special(path: str | Path) -> bool:
+    """Return whether there is something at a path that is neither a file nor a folder: a pipe or a device."""
+    return not os.path.isfile(path) and os.path.exists(path) and not os.path.isdir(path)
+
+
+def _inputs(job: Job) -> Iterator[str]:
+    yield job.input
+    for step in job.steps:
+        yield from step.files
+
+
+def _problem(job: Job, real_of: RealPath) -> str:
+    """Problem of the output of a job by its own files, empty without any."""
+    real = real_of(os.path.join(job.folder, job.output))
+    if real == real_of(os.path.join(job.folder, job.input)):
+        return f"'{job.input}' is its own output ('{job.output}' is a link to it, or below one)"
+    if real in (real_of(os.path.join(job.folder, name)) for name in _inputs(job)):
+        return f"'{job.output}', the output of '{job.input}', is a file that its own steps read"
+    if not real.startswith(os.path.join(real_of(str(job.folder)), "")):
+        return f"'{job.output}' leads out of the folder of the settings, by a link"
+    return f"'{job.output}' is no regular file" if is_special(real) else ""
+
+
+def _real_paths() -> RealPath:
+    """A function that follows links as `os.path.realpath`, which looks up folders once: many files have few."""
+    folder_of = cache(os.path.realpath)
+
+    @cache
+    def real_of(path: str) -> str:
+        folder, name = os.path.split(path)
+        return os.path.realpath(path) if os.path.islink(path) else os.path.join(folder_of(folder), name)
+
+    return real_of

@@ -1,0 +1,89 @@
+"""`run`: outputs that a link leads to an input or out of the folder, and inputs that are no regular files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from anim.errors import OutputError
+from cli.workflows.run.job import Job
+from cli.workflows.run.places import check_output
+from tests.cli.conftest import Call
+from tests.cli.running import built, refusal
+from tests.cli.running_recipes import write_crowd, write_recipe
+
+PLAIN = "resample --fps 12"
+
+
+@pytest.mark.parametrize(
+    ("link", "target", "words"),
+    [
+        ("build", ".", "is its own output"),
+        ("build", "..", "leads out of the folder of the settings"),
+        ("build/crowd/hero.glb", "../../crowd/hero.glb", "is its own output"),
+        ("build/crowd/hero.glb", "../../crowd/cube.glb", "is the input 'crowd/cube.glb'"),
+        ("build/crowd/hero.glb", "../../../outside.glb", "leads out of the folder of the settings"),
+        ("build/crowd/hero.glb", "cube.glb", "are the same output"),
+        ("build/crowd/hero.glb", "../../fifo", "is no regular file"),
+    ],
+)
+def test_no_link_leads_an_output_elsewhere(link: str, target: str, words: str, tmp_path: Path, call: Call) -> None:
+    """It replaced the input, or a file outside, with exit 0."""
+    folder = tmp_path / "project"
+    folder.mkdir()
+    write_crowd(folder, hero="biped", cube="morph_cube")
+    write_recipe(folder, PLAIN)
+    os.mkfifo(folder / "fifo")
+    (folder / link).parent.mkdir(parents=True, exist_ok=True)
+    (folder / link).symlink_to(target)
+    assert words in refusal(call("run", "--config", folder / "gltf-anim.toml"), 2)
+    assert (folder / "crowd/hero.glb").read_bytes() == built("biped")
+    assert (folder / "crowd/cube.glb").read_bytes() == built("morph_cube")
+    assert {each.name for each in tmp_path.iterdir()} == {"project"}
+
+
+def test_an_output_is_no_file_that_its_own_steps_read(folder: Path, call: Call) -> None:
+    write_recipe(folder, "from-euler --onto build/take.glb", match="*.bvh", out="build/{stem}.glb")
+    (folder / "take.bvh").write_text("HIERARCHY")
+    assert "is a file that its own steps read" in refusal(call("run"), 2)
+
+
+def test_a_step_may_read_what_another_recipe_makes(folder: Path, call: Call) -> None:
+    write_recipe(folder, PLAIN)
+    write_recipe(folder, "from-euler --onto 'build/crowd/arm 1.glb'", match="*.bvh", out="build/{stem}.glb")
+    (folder / "take.bvh").write_text("HIERARCHY")
+    assert "2 files: 1 made, 1 failed" in call("run", "--jobs", "1").err  # the .bvh is none
+
+
+def test_a_link_made_during_the_run_is_found_before_writing(folder: Path) -> None:
+    job = Job(folder, "crowd/arm 1.glb", "build/crowd/arm 1.glb", ())
+    check_output(job)
+    (folder / "build").symlink_to(".")
+    with pytest.raises(OutputError, match="its own output"):
+        check_output(job)
+
+
+def test_links_within_the_folder_remain(folder: Path, call: Call) -> None:
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, PLAIN)
+    (folder / "made").mkdir()
+    (folder / "build").symlink_to("made")
+    for words in ("2 made", "2 cached"):
+        assert words in call("run").err
+    assert (folder / "made/crowd/hero.glb").is_file()
+
+
+def test_pipes_among_the_inputs_are_left_out(folder: Path, call: Call) -> None:
+    """A run waited for a writer of the pipe."""
+    os.mkfifo(folder / "crowd/fifo.glb")
+    write_recipe(folder, PLAIN)
+    assert "1 file: 1 made" in call("run").err
+    assert "crowd/fifo.glb: is no regular file" in refusal(call("run", "crowd/fifo.glb"), 3)
+
+
+def test_files_of_steps_are_regular(folder: Path, call: Call) -> None:
+    os.mkfifo(folder / "tail.json")
+    write_recipe(folder, "simulate springs --chain '*' --springs tail.json")
+    assert "tail.json: is no regular file" in refusal(call("run"), 3)
