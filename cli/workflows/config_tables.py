@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from anim.errors import UnsupportedError
+from anim.files import resolver
 from cli.errors import UsageError
 from cli.tables import cut_middle
 
@@ -59,9 +61,12 @@ def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
 def _table(path: Path) -> dict[str, Any] | None:
     """The settings in a file, None if it has none."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        with path.open("rb") as file:
+            content = tomllib.loads(resolver.read_settings(file).decode("utf-8-sig"))
     except FileNotFoundError:
         return None
+    except UnsupportedError as error:
+        raise error.at(str(path), ": ") from None
     except RecursionError:
         raise UsageError(f"{path}: is nested too deep") from None
     except UnicodeDecodeError as error:
