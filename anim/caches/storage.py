@@ -14,6 +14,7 @@ from pathlib import PurePath
 from typing import BinaryIO, Protocol
 
 from anim.errors import FormatError
+from anim.files import resolver
 
 COPY_BYTES = 1 << 24  # approximate bytes that streaming readers and writers process at a time
 
@@ -91,7 +92,7 @@ def size_of(file: BinaryIO) -> int:
 def read_all(inputs: Inputs, name: str) -> Iterator[bytes]:
     """Yield all bytes of a file."""
     with inputs.open(name) as file:
-        yield file.read()
+        yield resolver.read_all(file)
 
 
 class _MemoryFile(io.BytesIO):

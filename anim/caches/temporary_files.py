@@ -14,6 +14,8 @@ from pathlib import Path
 
 from anim.caches.storage import COPY_BYTES, Inputs, Outputs
 from anim.errors import OutputError
+from anim.files import resolver
+from anim.memory import limit_for
 
 
 @contextmanager
@@ -69,7 +71,7 @@ def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"input{ending}"
         with inputs.open(name) as source, path.open("wb") as target:
-            shutil.copyfileobj(source, target, COPY_BYTES)
+            target.writelines(resolver.read_blocks(source, limit_for(0), block=COPY_BYTES))
         yield str(path)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from anim.memory import limit_for
 
 GLB_MAGIC = b"glTF"
 STREAM_CHUNK_BYTES = 1 << 20
+MAX_SETTINGS_BYTES = 64_000_000  # of a pipe or device: no settings have a tenth of it
 
 
 class CompanionFiles:
@@ -32,9 +34,7 @@ class CompanionFiles:
         return self._files[address]
 
 
-def read_file(
-    path: Path, ending: str = ".glb", *, read: Callable[[io.BufferedReader], bytes] = io.BufferedReader.read
-) -> Bytes:
+def read_file(path: Path, ending: str = ".glb", *, read: Callable[[io.BufferedReader], bytes] | None = None) -> Bytes:
     """Return the bytes of a file, read-only. ending: expected extension, for the hint about a folder.
 
     A copy instead of a memory map: the system kills a process whose mapped file is rewritten in place by another.
@@ -43,7 +43,7 @@ def read_file(
         if path.is_dir():
             raise FormatError("is a folder", help=_in_folder(path, ending))
         with path.open("rb") as file:
-            return np.frombuffer(read(file), np.uint8)
+            return np.frombuffer((read or read_all)(file), np.uint8)
     except OSError as error:
         raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 
@@ -58,28 +58,42 @@ def read_gltf(file: io.BufferedReader) -> bytes:
     is_glb = head[: len(GLB_MAGIC)] == GLB_MAGIC[: len(head)]
     if not is_glb and text[:1] not in (b"{", b""):
         return head
-    return file.read() if _is_regular(file) else _read_stream(file, int.from_bytes(head[8:12], "little") * is_glb)
+    if _has_size(file):
+        return file.read()  # at once: blocks would take their memory twice
+    stated = int.from_bytes(head[8:12], "little") * is_glb
+    return b"".join(read_blocks(file, max(limit_for(0), stated)))
 
 
-def _is_regular(file: io.BufferedReader) -> bool:
+def read_all(file: BinaryIO) -> bytes:
+    """Return all bytes of an open file. Raises UnsupportedError for a pipe or device above the memory limit."""
+    return file.read() if _has_size(file) else b"".join(read_blocks(file, limit_for(0)))
+
+
+def read_settings(file: BinaryIO) -> bytes:
+    """Return all bytes of a file of settings. Raises UnsupportedError for a pipe or device above 64 MB."""
+    most = min(limit_for(0), MAX_SETTINGS_BYTES)
+    return file.read() if _has_size(file) else b"".join(read_blocks(file, most, help="name a file"))
+
+
+def read_blocks(
+    file: BinaryIO, most: int, *, help: str = "raise `memory_limit`, or name a file", block: int = STREAM_CHUNK_BYTES
+) -> Iterator[bytes]:
+    """Yield the bytes of an open file in blocks. Raises UnsupportedError for a pipe or device of more than `most`."""
+    size, is_bounded = 0, _has_size(file)
+    while data := file.read(block):
+        size += len(data)
+        if size > most and not is_bounded:
+            raise UnsupportedError(f"is a pipe or device with more than {most / 1e9:.3g} GB", help=help)
+        yield data
+
+
+def _has_size(file: BinaryIO) -> bool:
+    """Whether a file ends at a size that the system knows: files of /proc are regular, and have none."""
     try:
-        return stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-    except OSError:  # as of bytes in memory
-        return False
-
-
-def _read_stream(file: io.BufferedReader, stated: int) -> bytes:
-    """All bytes of a pipe or device. stated: length of a GLB by its header, else 0."""
-    most, chunks, size = max(limit_for(0), stated), list[bytes](), 0
-    while chunk := file.read(STREAM_CHUNK_BYTES):
-        chunks.append(chunk)
-        size += len(chunk)
-        if size > most:
-            raise UnsupportedError(
-                f"is a pipe or device with more than {most / 1e9:.3g} GB",
-                help="raise `memory_limit`, or name a file",
-            )
-    return b"".join(chunks)
+        found = os.fstat(file.fileno())
+    except OSError:  # bytes in memory
+        return True
+    return stat.S_ISREG(found.st_mode) and found.st_size > 0
 
 
 def _in_folder(folder: Path, ending: str) -> str:

@@ -17,6 +17,7 @@ from anim.check.finding import Severity
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.selection import TARGETS, rule_of
 from anim.errors import AnimError, FormatError
+from anim.files import resolver
 from anim.units import plural
 from cli import errors
 from cli.errors import CheckError, UsageError
@@ -264,5 +265,5 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _load_baseline(path: str) -> Counter[str]:
-    with documents.content(path, ending=".json") as (data, _):
+    with documents.content(path, ending=".json", read=resolver.read_settings) as (data, _):
         return baseline.load(data.tobytes().decode(errors="replace"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -117,6 +118,7 @@ def _received(stack: ExitStack) -> CacheFolder:
     """Stdin as a file in a temporary folder, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
+    _refuse_endless()
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "stdin"
     try:
         with path.open("wb") as file:
@@ -124,6 +126,16 @@ def _received(stack: ExitStack) -> CacheFolder:
     except OSError as error:
         raise not_written("the temporary file for stdin", error).advise("TMPDIR names another folder for it") from None
     return CacheFolder(path.parent, path.name)
+
+
+def _refuse_endless() -> None:
+    """Raise FormatError for a device that gives bytes: it would fill the disk. /dev/null is an empty file."""
+    try:
+        is_device = stat.S_ISCHR(os.fstat(sys.stdin.fileno()).st_mode)
+    except OSError:  # bytes in memory
+        return
+    if is_device and sys.stdin.buffer.read(1):
+        raise FormatError("is a device (expected a file, or a pipe)")
 
 
 def _read_block() -> bytes:

@@ -63,14 +63,16 @@ def source(path: str, reporter: Reporter = AUDIBLE, opener: Opener = container.r
 
 
 @contextmanager
-def content(path: str, *, ending: str = ".glb") -> Iterator[tuple[Bytes, str]]:
+def content(
+    path: str, *, ending: str = ".glb", read: Callable[[io.BufferedReader], bytes] = resolver.read_all
+) -> Iterator[tuple[Bytes, str]]:
     """Give the bytes at `path`, "-" for stdin, and their name; errors raised inside name the input.
 
-    ending: expected file extension, for the hint if `path` is a folder.
+    ending: expected file extension, for the hint if `path` is a folder. read: limits pipes and devices.
     """
     name = called(path)
     try:
-        yield _stdin() if path == PIPE else _read_file(path, ending), name
+        yield _stdin(read) if path == PIPE else _read_file(path, ending, read), name
     except (UsageError, OutputError):
         raise
     except AnimError as error:
@@ -254,16 +256,16 @@ def _open_file(path: str, opener: Opener) -> Source:
     return found._replace(name=path)
 
 
-def _read_file(path: str, ending: str) -> Bytes:
+def _read_file(path: str, ending: str, read: Callable[[io.BufferedReader], bytes]) -> Bytes:
     check_name(path)
     located = Path(locate(path))
-    found = resolver.read_file(located, ending)
+    found = resolver.read_file(located, ending, read=read)
     record_files(located)
     depfile.add_inputs(located)
     return found
 
 
-def _stdin(read: Callable[[io.BufferedReader], bytes] = io.BufferedReader.read) -> Bytes:
+def _stdin(read: Callable[[io.BufferedReader], bytes]) -> Bytes:
     if (step := step_streams()) is not None:
         return step.input
     if sys.stdin is None:

@@ -11,6 +11,7 @@ from anim.exchange.retarget.apply import apply_to_character, matchable_nodes
 from anim.exchange.retarget.joint_roles import read_vrm_roles
 from anim.exchange.retarget.retained_tracks import add_retained_tracks, retained_tracks, scaled_ancestors
 from anim.exchange.retarget.retarget import GroundMode
+from anim.files import resolver
 from anim.gltf import authoring
 from anim.gltf.document import Document
 from anim.gltf.io.source import Source
@@ -103,7 +104,7 @@ def pairs(path: str | None) -> dict[str, str]:
     """Return the pairs of an alias file, empty for None."""
     if path is None:
         return {}
-    with documents.content(path, ending=".csv") as (data, _):
+    with documents.content(path, ending=".csv", read=resolver.read_settings) as (data, _):
         return joint_matching.read_aliases(data.tobytes())
 
 

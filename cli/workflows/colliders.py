@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from anim.files import resolver
 from anim.gltf.document import Document
 from anim.model import Scene
 from anim.operations.selection import Selection
@@ -46,7 +47,7 @@ def parse_colliders(
 def _of_file(name: str, document: Document, scene: Scene) -> tuple[Obstacle, ...]:
     if name == VRM:
         return from_spring_colliders(read_colliders(document))
-    with documents.content(name, ending=".json") as (data, _):
+    with documents.content(name, ending=".json", read=resolver.read_settings) as (data, _):
         bones = read_spring_file(data.tobytes(), scene.skeleton, has_chains=False)
     return from_spring_colliders(bones.colliders)
 

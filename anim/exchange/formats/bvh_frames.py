@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 
@@ -16,6 +17,7 @@ RATES = (*(n * 1000 / 1001 for n in (24, 30, 48, 60, 120)), 10, 12, 15, 20, 24, 
          120, 144, 150, 200, 240, 250, 300, 480, 500, 1000)  # fmt: skip
 RATE_TOLERANCE_FRAMES = 1e-3  # fraction of a frame; a frame time has few digits
 ROUNDING_FRAMES = 1e-7  # fraction of a frame; rounding error of nine digits
+MIN_SECONDS, MAX_SECONDS = 1e-6, 1e6
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 
 
@@ -34,7 +36,7 @@ def read_frames(lines: list[str], start: int, column: int, channels: int) -> Bvh
     channels: values per row. Rows may be wrapped. A row count other than the header's is noted; fewer than half of it
     is a truncated file. Raises FormatError with the line.
     """
-    claimed, seconds, body = _head(lines, start, column)
+    claimed, stated, body = _head(lines, start, column)
     numbers = _parse_rows(lines, body)
     if not channels:
         fail(start + 1, "no joint has a channel: there is no motion")
@@ -47,22 +49,23 @@ def read_frames(lines: list[str], start: int, column: int, channels: int) -> Bvh
         if not len(rows) or 2 * len(rows) < claimed:
             fail(len(lines), f"the file holds {len(rows)} of {claimed} claimed frames (truncated?)")
         notes.append(f"Frames says {claimed}, the file holds {len(rows)}: all of them are read")
+    seconds = float(stated)
     fps = _snap_rate(seconds)
-    if abs(fps * seconds - 1) > ROUNDING_FRAMES:
+    if not _is_rounded(stated, 1 / fps):
         notes.append(f"frame time {seconds:g} s is taken for 1/{fps:g} s")
     return BvhFrames(rows, fps, tuple(notes))
 
 
-def _head(lines: list[str], start: int, column: int) -> tuple[int, float, int]:
-    """Stated frame count, seconds per frame, and the first line (from 0) of rows, cut at its start."""
+def _head(lines: list[str], start: int, column: int) -> tuple[int, str, int]:
+    """Stated frame count, seconds per frame as written, and the first line (from 0) of rows, cut at its start."""
     lines[start] = lines[start][column:]
     line, found = _find(lines, start, r"\s*Frames\s*:?\s*(\d+)(?!\.?\d)", "Frames: and a whole number")
     claimed = parse_count(found)
     line, found = _find(lines, line, rf"\s*Frame\s*Time\s*:?\s*({NUMBER})(?!\S)", "Frame Time: and seconds")
     seconds = float(found)
-    if not 1e-6 <= seconds <= 1e6:
-        fail(line + 1, f"Frame Time is {found} (expected seconds above 0)")
-    return claimed, seconds, line
+    if not MIN_SECONDS <= seconds <= MAX_SECONDS:
+        fail(line + 1, f"Frame Time is {found[:40]} (expected seconds, {MIN_SECONDS:g} to {MAX_SECONDS:g})")
+    return claimed, found, line
 
 
 def _find(lines: list[str], start: int, pattern: str, expected: str) -> tuple[int, str]:
@@ -114,3 +117,13 @@ def _snap_rate(seconds: float) -> float:
     """Frames per second: a standard rate if the frame time equals one within its digits."""
     rate = min(RATES, key=lambda rate: abs(rate * seconds - 1))
     return rate if abs(rate * seconds - 1) < RATE_TOLERANCE_FRAMES else 1 / seconds
+
+
+def _is_rounded(stated: str, seconds: float) -> bool:
+    """Whether a frame time is these seconds, rounded to its own decimals: 0.0333333 is 1/30, 0.0334 is not.
+
+    Nine digits are enough in any case: some programs compute in float32, and cut digits off instead of rounding.
+    """
+    found = Decimal(stated)
+    step = Decimal(1).scaleb(int(found.as_tuple().exponent))
+    return abs(found - Decimal(seconds)) <= max(step / 2, Decimal(ROUNDING_FRAMES) * found)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, NoReturn
 
 from anim.errors import FormatError
-from anim.exchange.formats.text import error_at, parse_count
+from anim.exchange.formats.text import MAX_NUMBER, error_at, parse_count
 from anim.exchange.formats.text import parse_number as number_of
 
 CHANNELS = {f"{axis}{kind}".casefold(): (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
@@ -119,7 +119,7 @@ class _Parser:
         word = self._next(f"a number of {what}")
         value = number_of(word.text)
         if value is None:
-            fail(word.line, f"{what} holds '{_short(word.text)}' (expected three finite numbers)")
+            fail(word.line, f"{what} holds '{_short(word.text)}' (expected three numbers up to {MAX_NUMBER:g})")
         return value
 
     def _channels(self, joint: BvhJoint) -> None:

@@ -100,7 +100,7 @@ def test_frames_stand_on_their_grid(asset: Find) -> None:
     motion = bvh_reader.read(asset("bvh/cmu_01_01.bvh").read_bytes())
     times = from_euler(motion, tolerance=TOLERANCE).clip.tracks[0].times
     np.testing.assert_allclose(times, np.arange(2752) / 120, atol=1e-6)
-    assert any("1/120" in note for note in motion.notes)
+    assert not any("1/120" in note for note in motion.notes)
 
 
 def test_a_joint_by_hand() -> None:
@@ -236,3 +236,32 @@ def test_a_claim_of_frames_or_channels_allocates_nothing() -> None:
             bvh_reader.read(SMALL.replace(old, new).encode())
     assert tracemalloc.get_traced_memory()[1] < 1_000_000
     tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("stated", "rate", "noted"),
+    [
+        ("0.0333333", "30", False),
+        ("0.033", "30", False),
+        ("3.33333e-2", "30", False),
+        ("0.03334", "30", True),
+        ("0.0333320", "30", True),
+        ("0.041708334", "23.976", False),
+        ("0.1", "10", False),
+    ],
+)
+def test_a_frame_time_is_noted_where_it_is_more_than_rounded(stated: str, rate: str, noted: bool) -> None:
+    motion = bvh_reader.read(SMALL.replace("Time: 0.1", f"Time: {stated}").encode())
+    assert any(f"is taken for 1/{rate} s" in note for note in motion.notes) == noted
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("OFFSET 0 10 0", "OFFSET 0 1e38 0", r"OFFSET holds '1e38' \(expected three numbers up to 1e\+15\)"),
+        ("Time: 0.1", "Time: 1e30", r"Frame Time is 1e30 \(expected seconds, 1e-06 to 1e\+06\)"),
+    ],
+)
+def test_numbers_out_of_range_are_named_with_their_limits(old: str, new: str, problem: str) -> None:
+    with pytest.raises(FormatError, match=problem):
+        bvh_reader.read(SMALL.replace(old, new).encode())
