@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.cli.conftest import Call
+from tests.cli.running import refusal, shell
 from tests.cli.running_recipes import write_recipe
 
 CACHE = ".gltf-anim-cache"
@@ -46,3 +51,75 @@ def test_only_outputs_below_the_folder_are_deleted(
     assert (outside / "mine.glb").exists()
     assert (made / "link.glb").is_symlink()
     assert (made / "notes.txt").exists()
+
+
+@pytest.mark.parametrize("name", ["", "journal.jsonl", "outputs.json", "objects", "results"])
+@pytest.mark.parametrize("args", [(), ("--resume",)])
+def test_nothing_is_written_through_links_of_the_cache(
+    name: str, args: tuple[str, ...], made: Path, call: Call, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    target, path = tmp_path_factory.mktemp("outside") / "mine", made / CACHE / name
+    shutil.move(path, target)
+    path.symlink_to(target)
+    before = contents(target)
+    run = call("run", *args)
+    assert f"{path}: is a link" in refusal(run, 3)
+    assert contents(target) == before
+
+
+def contents(path: Path) -> dict[Path, bytes]:
+    """Files of a folder, or the file itself."""
+    return {each: each.read_bytes() for each in (path, *path.rglob("*")) if each.is_file()}
+
+
+def test_a_cache_that_the_user_names_may_be_a_link(
+    made: Path, call: Call, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    (made / "c").symlink_to(tmp_path_factory.mktemp("large"))
+    assert "1 made" in call("run", "--cache", "c").err
+    assert "1 cached" in call("run", "--cache", "c").err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no `ulimit -f`")
+@pytest.mark.parametrize("args", ["", "--jobs 1", "--resume"])
+def test_a_journal_that_can_not_be_written_is_one_line(args: str, made: Path) -> None:
+    (made / CACHE / "journal.jsonl").write_bytes(b"\n" * 1024)
+    run = shell(f"export PYTHONDONTWRITEBYTECODE=1; ulimit -f 1; gltf-anim run --resume {args}", made)
+    assert "journal.jsonl: can't be written (file too large)" in refusal(run, 3)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes")
+@pytest.mark.parametrize("name", ["outputs.json", "objects/*/*", "results/*/*"])
+def test_pipes_in_the_cache_are_as_if_absent(name: str, made: Path, call: Call) -> None:
+    (path,) = (made / CACHE).glob(name)
+    path.unlink()
+    os.mkfifo(path)
+    (made / "build/crowd/arm 1.glb").unlink()
+    call("run", "-q").product()
+    assert (made / "build/crowd/arm 1.glb").exists()
+    assert path.is_file()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes")
+def test_a_pipe_as_journal_is_refused(made: Path, call: Call) -> None:
+    path = made / CACHE / "journal.jsonl"
+    path.unlink()
+    os.mkfifo(path)
+    assert "journal.jsonl: can't be written" in refusal(call("run"), 3)
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    assert "journal.jsonl: is no regular file" in refusal(call("run", "--resume"), 3)
+    os.close(reader)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no /dev")
+@pytest.mark.parametrize("name", ["/dev/zero", "pipe"])
+def test_devices_that_a_record_names_are_not_read(name: str, made: Path, call: Call) -> None:
+    os.mkfifo(made / "pipe")
+    edit_record(made, files={name: "x"})
+    assert "1 file: 1 made" in call("run").err
+
+
+def edit_record(folder: Path, **values: Any) -> None:
+    """Change the record of the only result."""
+    (path,) = (folder / CACHE / "results").glob("*/*")
+    path.write_text(json.dumps({**json.loads(path.read_text()), **values}))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from anim import __version__
-from anim.files import atomic
+from anim.files.stream import write_stream
+from cli.workflows.run import own_files
 from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 
 NAME = "journal.jsonl"
@@ -44,7 +46,8 @@ class JournalEntry:
 class Journal:
     """Journal that a run writes; a line is complete in the file as soon as it is written."""
 
-    file: IO[str]
+    path: Path
+    file: io.FileIO
     earlier: dict[tuple[str, str], JournalEntry] = field(default_factory=dict)
 
     def write(self, entry: JournalEntry) -> None:
@@ -53,9 +56,8 @@ class Journal:
 
     def write_line(self, value: dict[str, Any]) -> None:
         """Append a JSON object as a line. Raises OutputError."""
-        with atomic.name_errors(Path(self.file.name)):
-            self.file.write(json.dumps(value, ensure_ascii=False) + "\n")
-            self.file.flush()
+        line = json.dumps(value, ensure_ascii=False) + "\n"
+        write_stream(self.file, [line.encode(errors="backslashreplace")], str(self.path))
 
     def find_done(self, folder: Path, input: str, output: str, recipe: str) -> JournalEntry | None:
         """Return the entry of an earlier run that made an output by these steps, if no file has changed since."""
@@ -72,13 +74,10 @@ class Journal:
 def open_journal(path: Path, files: int, *, resume: bool) -> Iterator[Journal]:
     """Open the journal of a run. resume: append to that of the last run, else begin a new one. Raises OutputError."""
     earlier = read_journal(path) if resume else {}
-    with atomic.name_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.open("a" if resume else "w", encoding="utf-8", errors="backslashreplace")
-    with file:
-        journal = Journal(file, earlier)
+    with own_files.open_for_lines(path, append=resume) as file:
+        journal = Journal(path, file, earlier)
         if resume:
-            file.write("\n")  # ends a line that was cut off
+            write_stream(file, [b"\n"], str(path))  # ends a line that was cut off
         journal.write_line({"run": {"version": __version__, "files": files, "resumed": resume}})
         yield journal
 
@@ -87,7 +86,7 @@ def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
     """Return the last entry of each input and output; none without a journal. Lines that are cut off are skipped."""
     entries: dict[tuple[str, str], JournalEntry] = {}
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        lines = own_files.read(path).decode(errors="replace").split("\n")
     except OSError:
         return entries
     for line in lines:

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from anim.errors import AnimError, not_written
-from anim.files import atomic
 from anim.gltf.io.container import SUFFIXES
 from anim.gltf.io.source import buffer_files, open_file
 from cli.workflows.check_config import matches
+from cli.workflows.run import own_files
 from cli.workflows.run.job import is_text
 from cli.workflows.run.recipe import Recipe
 from cli.workflows.run.stamps import Stamp, stamp_of
@@ -63,11 +63,15 @@ class OutputRecord:
         if kept != self.outputs:
             folders = {**_read(self.path), str(self.folder): kept}
             text = json.dumps({"schema": SCHEMA, "folders": folders}) + "\n"
-            atomic.write_file(self.path, [np.frombuffer(text.encode(), np.uint8)])
+            own_files.write(self.path.parent, self.path, np.frombuffer(text.encode(), np.uint8))
 
 
 def read_outputs(path: Path, folder: Path) -> OutputRecord:
-    """Return the record of a folder of settings; an empty one without a readable file."""
+    """Return the record of a folder of settings; an empty one without a readable file.
+
+    Raises OutputError for a link, which `save` doesn't write through.
+    """
+    own_files.check_links(path.parent, path)
     outputs: dict[str, tuple[str, Stamp]] = {}
     with suppress(ValueError, TypeError, AttributeError):
         known = _read(path).get(str(folder), {}).items()
@@ -121,7 +125,7 @@ def _buffers(path: Path) -> list[Path]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        value = json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
+        value = json.loads(own_files.read(path).decode(errors="surrogateescape"))
     except (OSError, ValueError, RecursionError):
         return {}
     folders = value.get("folders") if isinstance(value, dict) else None
