@@ -123,3 +123,43 @@ def edit_record(folder: Path, **values: Any) -> None:
     """Change the record of the only result."""
     (path,) = (folder / CACHE / "results").glob("*/*")
     path.write_text(json.dumps({**json.loads(path.read_text()), **values}))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"messages": [1]},
+        {"messages": 5},
+        {"size": "x"},
+        {"size": None},
+        {"size": float("inf")},
+        {"size": -1},
+        {"status": []},
+        {"files": []},
+        {"files": {"x": [float("inf"), 1]}},
+        {"output_stamp": [1]},
+    ],
+)
+def test_a_wrong_entry_of_a_journal_is_as_if_absent(values: dict[str, Any], made: Path, call: Call) -> None:
+    path = made / CACHE / "journal.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    path.write_text("".join(json.dumps({**line, **values} if "input" in line else line) + "\n" for line in lines))
+    run = call("run", "--resume", "--verbose")
+    run.product()
+    assert "1 file: 1 cached" in run.err
+
+
+@pytest.mark.parametrize("values", [{"size": 10**400}, {"size": -5}, {"is_plain": []}, {"files": {"x": 5}}])
+def test_a_wrong_record_of_a_result_is_as_if_absent(values: dict[str, Any], made: Path, call: Call) -> None:
+    edit_record(made, **values)
+    assert "1 file: 1 made" in call("run", "--verbose").err
+
+
+@pytest.mark.parametrize("value", [["a.glb", [float("inf"), 2]], ["a.glb", 5], [1, [1, 2]], 5])
+def test_a_wrong_entry_of_outputs_costs_no_other(value: object, made: Path, call: Call) -> None:
+    path = made / CACHE / "outputs.json"
+    content = json.loads(path.read_text())
+    content["folders"][str(made)]["build/x.glb"] = value
+    path.write_text(json.dumps(content))
+    (made / "crowd/arm 1.glb").unlink()
+    assert "(build/crowd/arm 1.glb)" in call("run").err

@@ -16,7 +16,7 @@ from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import OutputError
 from cli.workflows.run import own_files
-from cli.workflows.run.stamps import Stamp, stamp_of
+from cli.workflows.run.stamps import Stamp, is_size, stamp_of
 from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
@@ -41,8 +41,10 @@ class CacheRecord:
     def __post_init__(self) -> None:
         """Raise TypeError for values of other types."""
         is_hash = isinstance(self.product, str) and HASH.fullmatch(self.product)
-        if not is_hash or type(self.size) is not int or not isinstance(self.files, dict):
+        if not is_hash or not is_size(self.size) or type(self.is_plain) is not bool:
             raise TypeError("is no record of a result")
+        if not isinstance(self.files, dict) or not all(isinstance(each, str) for each in self.files.values()):
+            raise TypeError("has no hashes of files")
 
 
 @dataclass

@@ -13,7 +13,7 @@ from typing import Any
 from anim import __version__
 from anim.files.stream import write_stream
 from cli.workflows.run import own_files
-from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
+from cli.workflows.run.stamps import Stamp, is_size, parse_stamp, stamp_files, stamp_of
 
 NAME = "journal.jsonl"
 STATUSES = MADE, CACHED, DONE_BEFORE, FAILED = "made", "cached", "done before", "failed"
@@ -91,16 +91,24 @@ def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
         return entries
     for line in lines:
         with suppress(ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError):
-            value = json.loads(line)
-            stamps: dict[str, Any] = {
-                key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value
-            }
-            if value.get("files") is not None:
-                stamps["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
-            entry = JournalEntry(**{**value, **stamps})
+            entry = _entry(json.loads(line))
             entries[entry.input, entry.output] = entry
     return entries
 
 
+def _entry(value: dict[str, Any]) -> JournalEntry:
+    """The entry of a line. Raises TypeError for values of other types: somebody else may have written the journal."""
+    parsed: dict[str, Any] = {key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value}
+    if value.get("files") is not None:
+        parsed["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
+    messages = value.get("messages", [])
+    texts = [value[key] for key in ("input", "output", "recipe", "status")]
+    if not isinstance(messages, list) or not all(isinstance(each, str) for each in [*texts, *messages]):
+        raise TypeError("is no entry of a journal")
+    if not is_size(value.get("size", 0)) or type(value.get("code", 0)) is not int:
+        raise TypeError("has no size or code")
+    return JournalEntry(**{**value, **parsed, "messages": tuple(messages)})
+
+
 def _stamp(value: Any) -> Stamp | None:
-    return None if value is None else (int(value[0]), int(value[1]))
+    return None if value is None else parse_stamp(value)

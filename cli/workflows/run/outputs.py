@@ -19,7 +19,7 @@ from cli.workflows.check_config import matches
 from cli.workflows.run import own_files
 from cli.workflows.run.job import is_text
 from cli.workflows.run.recipe import Recipe
-from cli.workflows.run.stamps import Stamp, stamp_of
+from cli.workflows.run.stamps import Stamp, parse_stamp, stamp_of
 
 NAME = "outputs.json"  # in the folder of the cache
 SCHEMA = 1
@@ -73,13 +73,12 @@ def read_outputs(path: Path, folder: Path) -> OutputRecord:
     """
     own_files.check_links(path.parent, path)
     outputs: dict[str, tuple[str, Stamp]] = {}
-    with suppress(ValueError, TypeError, AttributeError):
-        known = _read(path).get(str(folder), {}).items()
-        outputs = {
-            name: (str(source), (int(size), int(time)))
-            for name, (source, (size, time)) in known
-            if _is_output_name(name)
-        }
+    known = _read(path).get(str(folder), {})
+    for name, value in known.items() if isinstance(known, dict) else ():
+        with suppress(ValueError, TypeError):
+            source, stamp = value
+            if _is_output_name(name) and isinstance(source, str):
+                outputs[name] = source, parse_stamp(stamp)
     return OutputRecord(path, folder, outputs)
 
 
