@@ -163,3 +163,12 @@ def test_a_wrong_entry_of_outputs_costs_no_other(value: object, made: Path, call
     path.write_text(json.dumps(content))
     (made / "crowd/arm 1.glb").unlink()
     assert "(build/crowd/arm 1.glb)" in call("run").err
+
+
+def test_other_files_in_the_folder_of_the_cache_are_not_deleted(made: Path, call: Call) -> None:
+    mine = [made / "c/objects/aa/mine.blend", made / f"c/objects/aa/{'b' * 64}"]
+    mine[0].parent.mkdir(parents=True)
+    for path in mine:
+        path.write_bytes(bytes(10_000))
+    assert "1 result" in call("run", "--cache", "c", "--cache-size", "1kB").err
+    assert all(path.exists() for path in mine)
