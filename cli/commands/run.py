@@ -20,7 +20,7 @@ from cli.options import common
 from cli.text import Reporter, format_bytes
 from cli.workflows.run import cache as caching
 from cli.workflows.run import journal as journals
-from cli.workflows.run import outputs
+from cli.workflows.run import outputs, own_files
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
 from cli.workflows.run.job import Job
@@ -117,7 +117,7 @@ def command(
     if delete_stale and (inputs or recipe):
         raise UsageError("--delete-stale needs a run of all files and recipes", help="leave out FILE and --recipe")
     book = read_recipes(config)
-    folder = book.folder / caching.NAME if cache is None else Path(cache).resolve()
+    folder = _cache_folder(book.folder, cache)
     record = outputs.read_outputs(folder / outputs.NAME, book.folder)
     is_all = not (inputs or recipe)
     try:
@@ -148,6 +148,14 @@ def command(
         record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written]
     return max(code, _check(written, quiet=quiet)) if check else code
+
+
+def _cache_folder(settings: Path, named: str | None) -> Path:
+    """Folder of results and journal. Only a name of the user's own may be a link: another may have come with files."""
+    if named is not None:
+        return Path(named).resolve()
+    own_files.check_links(settings, settings / caching.NAME)
+    return settings / caching.NAME
 
 
 def _prune(results: caching.ResultCache, limit: int, reporter: Reporter) -> None:

@@ -16,8 +16,8 @@ import pytest
 from cli.workflows.run.job import Job, JobResult, shorten
 from cli.workflows.run.workers import local_pool, run_jobs
 from tests.cli.conftest import Call
-from tests.cli.running import ENVIRONMENT, started
-from tests.cli.running_recipes import journal, statuses, write_long_run
+from tests.cli.running import ENVIRONMENT, refusal, shell, started
+from tests.cli.running_recipes import journal, statuses, write_long_run, write_recipe
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 NUM_FILES = 20
@@ -163,3 +163,10 @@ def test_many_messages_fit_in_the_buffer_of_a_pipe() -> None:
         assert len(pickle.dumps(JobResult(0, found))) < 1 << 15
     assert shorten(lines[:30]) == tuple(lines[:30])
     assert shorten([]) == ()
+
+
+@pytest.mark.parametrize("count", [5, 10, 14])
+def test_too_few_open_files_for_workers_are_one_line(count: int, folder: Path) -> None:
+    write_recipe(folder, "resample --fps 12", match="**/*.glb")
+    run = shell(f"ulimit -n {count}; gltf-anim run --jobs 2", folder)
+    assert "worker processes can't be started (too many open files)" in refusal(run, 4)

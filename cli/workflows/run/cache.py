@@ -14,9 +14,9 @@ import numpy as np
 
 from anim import __version__
 from anim.arrays import Bytes
-from anim.errors import AnimError
-from anim.files import atomic, resolver
-from cli.workflows.run.stamps import Stamp, stamp_of
+from anim.errors import OutputError
+from cli.workflows.run import own_files
+from cli.workflows.run.stamps import Stamp, is_size, stamp_of
 from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
@@ -41,8 +41,10 @@ class CacheRecord:
     def __post_init__(self) -> None:
         """Raise TypeError for values of other types."""
         is_hash = isinstance(self.product, str) and HASH.fullmatch(self.product)
-        if not is_hash or type(self.size) is not int or not isinstance(self.files, dict):
+        if not is_hash or not is_size(self.size) or type(self.is_plain) is not bool:
             raise TypeError("is no record of a result")
+        if not isinstance(self.files, dict) or not all(isinstance(each, str) for each in self.files.values()):
+            raise TypeError("has no hashes of files")
 
 
 @dataclass
@@ -52,17 +54,20 @@ class FileHashes:
     _known: dict[str, tuple[Stamp, str]] = field(default_factory=dict)
 
     def hash(self, path: str) -> str:
-        """Return the hash of a file, "" if it can't be read."""
+        """Return the hash of a file, "" if it can't be read.
+
+        That of a device or pipe, which may never end and has other content each time, is equal to no other.
+        """
         stamp = stamp_of(path)
         if stamp is None:
             return ""
         known = self._known.get(path)
         if known is None or known[0] != stamp:
             try:
-                with open(path, "rb") as file:
+                with own_files.open_regular(path) as file:
                     known = stamp, hashlib.file_digest(file, "sha256").hexdigest()
             except OSError:
-                return ""
+                return os.urandom(32).hex() if own_files.is_special(path) else ""
             self._known[path] = known
         return known[1]
 
@@ -76,7 +81,7 @@ class ResultCache:
     def find(self, key: str, folder: Path, hashes: FileHashes) -> CacheRecord | None:
         """Return the record of a key if all files that its steps read are the same. folder: of relative paths."""
         try:
-            record = CacheRecord(**json.loads(self._record(key).read_bytes()))
+            record = CacheRecord(**json.loads(own_files.read(self._record(key))))
         except (OSError, ValueError, TypeError, RecursionError):  # none, or of another version
             return None
         same = all(hashes.hash(os.path.join(folder, path)) == digest for path, digest in record.files.items())
@@ -85,8 +90,8 @@ class ResultCache:
     def product(self, record: CacheRecord) -> Bytes | None:
         """Return the GLB of a record; None if it is lost or damaged."""
         try:
-            data = resolver.read_file(self._object(record.product))
-        except AnimError:
+            data = np.frombuffer(own_files.read(self._object(record.product)), np.uint8)
+        except OSError:
             return None
         return data if hash_of(data) == record.product else None
 
@@ -97,20 +102,22 @@ class ResultCache:
         self._write(self._record(key), np.frombuffer(json.dumps(asdict(record)).encode(), np.uint8))
 
     def prepare(self) -> None:
-        """Create the folder, ignored by git and by backups. Raises OutputError."""
+        """Create the folder, ignored by git and by backups. Raises OutputError, also for links in it."""
+        for folder in (self.results, self.objects):
+            own_files.check_links(self.folder, folder)
         for name, text in ((".gitignore", "*\n"), ("CACHEDIR.TAG", TAG)):
             if not (self.folder / name).exists():
                 self._write(self.folder / name, np.frombuffer(text.encode(), np.uint8))
 
     def _write(self, path: Path, data: Bytes) -> None:
-        with atomic.name_errors(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-        atomic.write_file(path, [data])
+        own_files.write(self.folder, path, data)
 
     def mark_used(self, record: CacheRecord) -> None:
         """Set the time of a product, by which those that were not used for longest are found."""
-        with suppress(OSError):
-            os.utime(self._object(record.product))
+        path = self._object(record.product)
+        with suppress(OSError, OutputError):
+            own_files.check_links(self.folder, path)
+            os.utime(path)
 
     @property
     def results(self) -> Path:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from anim import __version__
-from anim.files import atomic
-from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
+from anim.files.stream import write_stream
+from cli.workflows.run import own_files
+from cli.workflows.run.stamps import Stamp, is_size, parse_stamp, stamp_files, stamp_of
 
 NAME = "journal.jsonl"
 STATUSES = MADE, CACHED, DONE_BEFORE, FAILED = "made", "cached", "done before", "failed"
@@ -44,7 +46,8 @@ class JournalEntry:
 class Journal:
     """Journal that a run writes; a line is complete in the file as soon as it is written."""
 
-    file: IO[str]
+    path: Path
+    file: io.FileIO
     earlier: dict[tuple[str, str], JournalEntry] = field(default_factory=dict)
 
     def write(self, entry: JournalEntry) -> None:
@@ -53,9 +56,8 @@ class Journal:
 
     def write_line(self, value: dict[str, Any]) -> None:
         """Append a JSON object as a line. Raises OutputError."""
-        with atomic.name_errors(Path(self.file.name)):
-            self.file.write(json.dumps(value, ensure_ascii=False) + "\n")
-            self.file.flush()
+        line = json.dumps(value, ensure_ascii=False) + "\n"
+        write_stream(self.file, [line.encode(errors="backslashreplace")], str(self.path))
 
     def find_done(self, folder: Path, input: str, output: str, recipe: str) -> JournalEntry | None:
         """Return the entry of an earlier run that made an output by these steps, if no file has changed since."""
@@ -72,13 +74,10 @@ class Journal:
 def open_journal(path: Path, files: int, *, resume: bool) -> Iterator[Journal]:
     """Open the journal of a run. resume: append to that of the last run, else begin a new one. Raises OutputError."""
     earlier = read_journal(path) if resume else {}
-    with atomic.name_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.open("a" if resume else "w", encoding="utf-8", errors="backslashreplace")
-    with file:
-        journal = Journal(file, earlier)
+    with own_files.open_for_lines(path, append=resume) as file:
+        journal = Journal(path, file, earlier)
         if resume:
-            file.write("\n")  # ends a line that was cut off
+            write_stream(file, [b"\n"], str(path))  # ends a line that was cut off
         journal.write_line({"run": {"version": __version__, "files": files, "resumed": resume}})
         yield journal
 
@@ -87,21 +86,29 @@ def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
     """Return the last entry of each input and output; none without a journal. Lines that are cut off are skipped."""
     entries: dict[tuple[str, str], JournalEntry] = {}
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        lines = own_files.read(path).decode(errors="replace").split("\n")
     except OSError:
         return entries
     for line in lines:
         with suppress(ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError):
-            value = json.loads(line)
-            stamps: dict[str, Any] = {
-                key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value
-            }
-            if value.get("files") is not None:
-                stamps["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
-            entry = JournalEntry(**{**value, **stamps})
+            entry = _entry(json.loads(line))
             entries[entry.input, entry.output] = entry
     return entries
 
 
+def _entry(value: dict[str, Any]) -> JournalEntry:
+    """The entry of a line. Raises TypeError for values of other types: somebody else may have written the journal."""
+    parsed: dict[str, Any] = {key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value}
+    if value.get("files") is not None:
+        parsed["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
+    messages = value.get("messages", [])
+    texts = [value[key] for key in ("input", "output", "recipe", "status")]
+    if not isinstance(messages, list) or not all(isinstance(each, str) for each in [*texts, *messages]):
+        raise TypeError("is no entry of a journal")
+    if not is_size(value.get("size", 0)) or type(value.get("code", 0)) is not int:
+        raise TypeError("has no size or code")
+    return JournalEntry(**{**value, **parsed, "messages": tuple(messages)})
+
+
 def _stamp(value: Any) -> Stamp | None:
-    return None if value is None else (int(value[0]), int(value[1]))
+    return None if value is None else parse_stamp(value)

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import json
+import stat
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 
 from anim.errors import AnimError, not_written
-from anim.files import atomic
+from anim.gltf.io.container import SUFFIXES
 from anim.gltf.io.source import buffer_files, open_file
 from cli.workflows.check_config import matches
+from cli.workflows.run import own_files
 from cli.workflows.run.job import is_text
 from cli.workflows.run.recipe import Recipe
-from cli.workflows.run.stamps import Stamp, stamp_of
+from cli.workflows.run.stamps import Stamp, parse_stamp, stamp_of
 
 NAME = "outputs.json"  # in the folder of the cache
 SCHEMA = 1
@@ -46,8 +48,12 @@ class OutputRecord:
         return any(matches(source, each.match) and each.output_of(source) == name for each in recipes)
 
     def find_stale(self, used: Collection[str]) -> list[str]:
-        """Return the unchanged outputs that are not used, sorted. used: inputs and outputs of all recipes."""
-        return sorted(filter(self.is_unchanged, self.outputs.keys() - set(used)))
+        """Return the unchanged outputs that are not used, sorted. used: inputs and outputs of all recipes.
+
+        Files elsewhere, to which a link leads, and links are left alone.
+        """
+        unused = filter(self.is_unchanged, self.outputs.keys() - set(used))
+        return sorted(name for name in unused if _is_inside(self.folder, name))
 
     def save(self, written: Mapping[str, str], forgotten: Collection[str] = ()) -> None:
         """Add outputs, each with its input, to the record, and remove some. Raises OutputError."""
@@ -57,16 +63,38 @@ class OutputRecord:
         if kept != self.outputs:
             folders = {**_read(self.path), str(self.folder): kept}
             text = json.dumps({"schema": SCHEMA, "folders": folders}) + "\n"
-            atomic.write_file(self.path, [np.frombuffer(text.encode(), np.uint8)])
+            own_files.write(self.path.parent, self.path, np.frombuffer(text.encode(), np.uint8))
 
 
 def read_outputs(path: Path, folder: Path) -> OutputRecord:
-    """Return the record of a folder of settings; an empty one without a readable file."""
+    """Return the record of a folder of settings; an empty one without a readable file.
+
+    Raises OutputError for a link, which `save` doesn't write through.
+    """
+    own_files.check_links(path.parent, path)
     outputs: dict[str, tuple[str, Stamp]] = {}
-    with suppress(ValueError, TypeError, AttributeError):
-        known = _read(path).get(str(folder), {}).items()
-        outputs = {name: (str(source), (int(size), int(time))) for name, (source, (size, time)) in known}
+    known = _read(path).get(str(folder), {})
+    for name, value in known.items() if isinstance(known, dict) else ():
+        with suppress(ValueError, TypeError):
+            source, stamp = value
+            if _is_output_name(name) and isinstance(source, str):
+                outputs[name] = source, parse_stamp(stamp)
     return OutputRecord(path, folder, outputs)
+
+
+def _is_output_name(name: str) -> bool:
+    """Return whether a recipe can have an output of this name: the record may be another's work."""
+    path = PurePath(name)
+    return not path.is_absolute() and ".." not in path.parts and path.suffix.lower() in SUFFIXES
+
+
+def _is_inside(folder: Path, name: str) -> bool:
+    """Return whether a name is that of a regular file, no link, that really is below the folder."""
+    path = folder / name
+    try:
+        return stat.S_ISREG(path.lstat().st_mode) and path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError):
+        return False
 
 
 def delete_outputs(folder: Path, names: Iterable[str]) -> None:
@@ -96,7 +124,7 @@ def _buffers(path: Path) -> list[Path]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        value = json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
+        value = json.loads(own_files.read(path).decode(errors="surrogateescape"))
     except (OSError, ValueError, RecursionError):
         return {}
     folders = value.get("folders") if isinstance(value, dict) else None

@@ -13,11 +13,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from typing import TypeAlias
 
+from anim.errors import UnsupportedError, is_out_of_memory
 from anim.files import signals
 from anim.worker_processes import Lifeline, follow_parent, open_lifeline
 from cli import errors
 from cli.workflows.run.job import Job, JobResult, run_job
 
+HELP = "fewer --jobs need less, and `ulimit -a` shows the limits"
 MAX_CLEAN_UP_S = 2.0  # of a worker, when the parent has ended
 Answer: TypeAlias = tuple[Job, JobResult]
 OpenPool: TypeAlias = Callable[[int], AbstractContextManager[Executor]]  # of a number of workers
@@ -112,11 +114,14 @@ def run_in_worker(job: Job) -> JobResult:
 
 @contextmanager
 def local_pool(count: int) -> Iterator[Executor]:
-    """Provide a pool of processes of this machine, which end with this one."""
+    """Provide a pool of processes of this machine, which end with this one.
+
+    Raises UnsupportedError if the system has no more files, processes or semaphores for them.
+    """
     start = "fork" if sys.platform == "linux" else "spawn"
     context = multiprocessing.get_context(start)
     gc.freeze()  # what this process has loaded is never collected by forked ones, so that its pages stay shared
-    with signals.ignore_broken_pipes(), open_lifeline(context, start) as lifeline:
+    with _name_errors(), signals.ignore_broken_pipes(), open_lifeline(context, start) as lifeline:
         pool = ProcessPoolExecutor(count, context, _set_up, (lifeline,))
         try:
             yield pool
@@ -124,6 +129,17 @@ def local_pool(count: int) -> Iterator[Executor]:
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+@contextmanager
+def _name_errors() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if is_out_of_memory(error):
+            raise
+        reason = (error.strerror or str(error)).lower()
+        raise UnsupportedError(f"worker processes can't be started ({reason})", help=HELP) from None
 
 
 def _set_up(lifeline: Lifeline) -> None:
