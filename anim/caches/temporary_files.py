@@ -13,7 +13,18 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
 from anim.caches.storage import COPY_BYTES, Inputs, Outputs
-from anim.errors import OutputError
+from anim.errors import OutputError, not_written
+
+
+@contextmanager
+def temporary_folder() -> Iterator[str]:
+    """Yield a new folder for temporary files. Raises OutputError where the system has no room for one."""
+    try:
+        made = tempfile.TemporaryDirectory()
+    except OSError as error:
+        raise not_written("a temporary folder", error).advise("TMPDIR names another folder for it") from None
+    with made as folder:
+        yield folder
 
 
 @contextmanager
@@ -24,7 +35,7 @@ def temp_output(
 
     failures: errors of the package that writes there, which become an OutputError.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         path = Path(folder) / f"output{ending}"
         try:
             yield str(path)
@@ -66,7 +77,7 @@ def _max_file_size() -> float:
 @contextmanager
 def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
     """Yield a path from which the bytes of an input can be read."""
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         path = Path(folder) / f"input{ending}"
         with inputs.open(name) as source, path.open("wb") as target:
             shutil.copyfileobj(source, target, COPY_BYTES)

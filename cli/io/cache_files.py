@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from anim.caches.formats import mesh_sequence
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.storage import suffix
+from anim.caches.temporary_files import temporary_folder
 from anim.errors import AnimError, DataRangeError, FormatError, OutputError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
@@ -150,7 +150,7 @@ def save(
             help="convert-cache --at takes one of them",
         )
     with ExitStack() as stack:
-        away = stack.enter_context(tempfile.TemporaryDirectory()) if is_pipe or dry_run else ""
+        away = stack.enter_context(temporary_folder()) if is_pipe or dry_run else ""
         staged = cache_folders.outputs(path, away, dry_run=dry_run)
         try:
             written = registry.writer_for(ending)(cache, staged, writing)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from anim.arrays import Bytes
 from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
+from anim.caches.temporary_files import temporary_folder
 from anim.errors import FormatError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
@@ -117,7 +117,7 @@ def _received(stack: ExitStack) -> CacheFolder:
     """Stdin as a file in a temporary folder, so that it can be read more than once."""
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
-    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "stdin"
+    path = Path(stack.enter_context(temporary_folder())) / "stdin"
     try:
         with path.open("wb") as file:
             file.writelines(iter(_read_block, b""))
