@@ -13,9 +13,20 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
 from anim.caches.storage import COPY_BYTES, Inputs, Outputs
-from anim.errors import OutputError
+from anim.errors import OutputError, not_written
 from anim.files import resolver
 from anim.memory import limit_for
+
+
+@contextmanager
+def temporary_folder() -> Iterator[str]:
+    """Yield a new folder for temporary files. Raises OutputError where the system has no room for one."""
+    try:
+        made = tempfile.TemporaryDirectory()
+    except OSError as error:
+        raise not_written("a temporary folder", error).advise("TMPDIR names another folder for it") from None
+    with made as folder:
+        yield folder
 
 
 @contextmanager
@@ -26,7 +37,7 @@ def temp_output(
 
     failures: errors of the package that writes there, which become an OutputError.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         path = Path(folder) / f"output{ending}"
         try:
             yield str(path)
@@ -68,7 +79,7 @@ def _max_file_size() -> float:
 @contextmanager
 def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
     """Yield a path from which the bytes of an input can be read."""
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         path = Path(folder) / f"input{ending}"
         with inputs.open(name) as source, path.open("wb") as target:
             target.writelines(resolver.read_blocks(source, limit_for(0), block=COPY_BYTES))

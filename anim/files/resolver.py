@@ -17,7 +17,7 @@ from anim.memory import limit_for
 
 GLB_MAGIC = b"glTF"
 STREAM_CHUNK_BYTES = 1 << 20
-MAX_SETTINGS_BYTES = 64_000_000  # of a pipe or device: no settings have a tenth of it
+MAX_OPTIONS_BYTES = 64_000_000  # of a pipe or device: no settings have a tenth of it
 
 
 class CompanionFiles:
@@ -69,9 +69,9 @@ def read_all(file: BinaryIO) -> bytes:
     return file.read() if _has_size(file) else b"".join(read_blocks(file, limit_for(0)))
 
 
-def read_settings(file: BinaryIO) -> bytes:
-    """Return all bytes of a file of settings. Raises UnsupportedError for a pipe or device above 64 MB."""
-    most = min(limit_for(0), MAX_SETTINGS_BYTES)
+def read_options(file: BinaryIO) -> bytes:
+    """Return all bytes of a file of options. Raises UnsupportedError for a pipe or device above 64 MB."""
+    most = min(limit_for(0), MAX_OPTIONS_BYTES)
     return file.read() if _has_size(file) else b"".join(read_blocks(file, most, help="name a file"))
 
 
@@ -88,7 +88,7 @@ def read_blocks(
 
 
 def _has_size(file: BinaryIO) -> bool:
-    """Whether a file ends at a size that the system knows: files of /proc are regular, and have none."""
+    """Return True for a file that ends at a size that the system knows: files of /proc are regular, and have none."""
     try:
         found = os.fstat(file.fileno())
     except OSError:  # bytes in memory

@@ -265,5 +265,5 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _load_baseline(path: str) -> Counter[str]:
-    with documents.content(path, ending=".json", read=resolver.read_settings) as (data, _):
+    with documents.content(path, ending=".json", read=resolver.read_options) as (data, _):
         return baseline.load(data.tobytes().decode(errors="replace"))

@@ -133,7 +133,9 @@ def command(
 
         counted = _counted(cache, progress)
         try:
-            saved = cache_files.save(counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with)
+            saved = cache_files.save(
+                counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with, input=input
+            )
         finally:
             progress.close()
         size = loaded.size

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from anim.caches.formats import mesh_sequence
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
 from anim.caches.registry import CACHE_FORMATS, Files, sniff_format
 from anim.caches.storage import suffix
+from anim.caches.temporary_files import temporary_folder
 from anim.errors import AnimError, DataRangeError, FormatError, OutputError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
@@ -136,12 +136,14 @@ def save(
     ending: str,
     dry_run: bool = False,
     commit_with: CommitWith = commit_alone,
+    input: str = documents.PIPE,
 ) -> SavedCache:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
     Companion files (a rest mesh) are left out on stdout, with a note.
     commit_with: makes other outputs of the written files, and replaces theirs after the cache's: an error of it leaves
     all files as they were. Not called for stdout.
+    input: the path of what the cache is made of, which is never replaced by a companion file: a UsageError.
     """
     is_pipe = path == documents.PIPE
     if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
@@ -150,7 +152,7 @@ def save(
             help="convert-cache --at takes one of them",
         )
     with ExitStack() as stack:
-        away = stack.enter_context(tempfile.TemporaryDirectory()) if is_pipe or dry_run else ""
+        away = stack.enter_context(temporary_folder()) if is_pipe or dry_run else ""
         staged = cache_folders.outputs(path, away, dry_run=dry_run)
         try:
             written = registry.writer_for(ending)(cache, staged, writing)
@@ -159,6 +161,8 @@ def save(
             if is_pipe and not dry_run:
                 cache_folders.to_stdout(staged)
             elif not is_pipe:
+                if CACHE_FORMATS[ending].files is not Files.FRAMES:
+                    _check_companions(staged, path, input)
                 with commit_with(cache_folders.StagedFolder(staged)):
                     if not dry_run:
                         _commit(staged, path)
@@ -170,6 +174,18 @@ def save(
     left = unwritable_note(staged.names[:-1]) if is_pipe else ()
     orphans = () if is_pipe else orphan_warnings(path, names, ending)
     return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)), orphans)
+
+
+def _check_companions(staged: AtomicOutputs, path: str, input: str) -> None:
+    """Raise UsageError if the input is replaced by a file beside the output, whose name nobody gave."""
+    if input == documents.PIPE:
+        return
+    real, folder = os.path.realpath(input), os.path.dirname(os.path.realpath(path))
+    for name in staged.names:
+        if name != staged.main and real == os.path.join(folder, name):
+            raise UsageError(
+                f"{input}: would be replaced by the file of this name beside {path}", help="choose another name for OUT"
+            )
 
 
 def _commit(staged: AtomicOutputs, path: str) -> None:

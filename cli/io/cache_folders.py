@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import stat
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from anim.arrays import Bytes
 from anim.caches.registry import SIGNATURE_BYTES
 from anim.caches.storage import COPY_BYTES
+from anim.caches.temporary_files import temporary_folder
 from anim.errors import FormatError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
@@ -119,7 +119,7 @@ def _received(stack: ExitStack) -> CacheFolder:
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError("no input: name a file, or pipe a cache into stdin")
     _refuse_endless()
-    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "stdin"
+    path = Path(stack.enter_context(temporary_folder())) / "stdin"
     try:
         with path.open("wb") as file:
             file.writelines(iter(_read_block, b""))

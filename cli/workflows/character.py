@@ -104,7 +104,7 @@ def pairs(path: str | None) -> dict[str, str]:
     """Return the pairs of an alias file, empty for None."""
     if path is None:
         return {}
-    with documents.content(path, ending=".csv", read=resolver.read_settings) as (data, _):
+    with documents.content(path, ending=".csv", read=resolver.read_options) as (data, _):
         return joint_matching.read_aliases(data.tobytes())
 
 

@@ -47,7 +47,7 @@ def parse_colliders(
 def _of_file(name: str, document: Document, scene: Scene) -> tuple[Obstacle, ...]:
     if name == VRM:
         return from_spring_colliders(read_colliders(document))
-    with documents.content(name, ending=".json", read=resolver.read_settings) as (data, _):
+    with documents.content(name, ending=".json", read=resolver.read_options) as (data, _):
         bones = read_spring_file(data.tobytes(), scene.skeleton, has_chains=False)
     return from_spring_colliders(bones.colliders)
 

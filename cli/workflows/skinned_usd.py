@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from anim.caches.source_document.bake_source import self_contained
+from anim.caches.temporary_files import temporary_folder
 from anim.errors import not_written
 from anim.exchange.usd_skel.write import UsdSkelResult, write
 from anim.gltf.document import Document
@@ -74,7 +74,7 @@ def _convert(
 ) -> None:
     began = time.perf_counter()
     source, document, scene = read
-    with tempfile.TemporaryDirectory() as away:
+    with temporary_folder() as away:
         staged = cache_folders.outputs(path, away, dry_run=dry_run)
         try:
             written = write(document, scene, clip, staged, ending=Path(path).suffix.lower(), fps=fps)

@@ -255,7 +255,6 @@ ENDLESS = (
     "from-euler - out.glb < /dev/zero",
     "yes 'v 1 2 3' | gltf-anim render - out.png",
     "check arm.glb --baseline /dev/zero",
-    "check arm.glb --config /dev/zero",
     "simulate springs arm.glb out.glb --clip '#0' --springs /dev/zero",
     "simulate cloth arm.glb out.npz --clip '#0' --colliders /dev/zero",
     "mkfifo a.usda; yes '#usda' > a.usda & gltf-anim convert-cache a.usda out.npz",

@@ -196,3 +196,16 @@ def test_links_are_written_through(call: Call, walk: Path, tmp_path: Path) -> No
         assert path.is_symlink()
     assert real.read_bytes() == (tmp_path / "real" / "new.glb").read_bytes() == call("convert", walk).product()
     assert sorted(path.name for path in (tmp_path / "real").iterdir()) == ["new.glb", "out.glb"]
+
+
+def test_an_input_is_not_replaced_by_a_file_beside_the_output(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    source, given = tmp_path / "w.pc2-rest.ply", built("arm")
+    source.write_bytes(given)
+    for input, output in (("w.pc2-rest.ply", tmp_path / "w.pc2"), (source, "w.pc2")):
+        run = call("bake", input, output, "--clip", "bend", "--fps", "5")
+        assert "would be replaced by the file of this name beside" in refusal(run, 2)
+        assert [each.name for each in tmp_path.iterdir()] == [source.name]
+        assert source.read_bytes() == given

@@ -120,7 +120,7 @@ def _snap_rate(seconds: float) -> float:
 
 
 def _is_rounded(stated: str, seconds: float) -> bool:
-    """Whether a frame time is these seconds, rounded to its own decimals: 0.0333333 is 1/30, 0.0334 is not.
+    """Return True if a frame time is these seconds, rounded to its own decimals: 0.0333333 is 1/30, 0.0334 is not.
 
     Nine digits are enough in any case: some programs compute in float32, and cut digits off instead of rounding.
     """

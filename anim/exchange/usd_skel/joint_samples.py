@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arrays import AnyArray, Bools, Floats
+from anim.errors import UnsupportedError
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup
 from anim.maths import matrix, quaternion
 from anim.model import Pose
@@ -19,6 +20,7 @@ from anim.sampling.pose import PosedSkeleton
 CONSTANT_SCALE_TOLERANCE = 1e-6  # relative
 FLOAT16_ROUNDING = 5e-4  # relative
 MIN_STORED_SCALE = 1e-3  # smaller ones have fewer digits in float16
+MAX_FLOAT16 = float(np.finfo(np.float16).max)
 MIN_DETERMINANT = 1e-12  # of a parent's matrix whose rounding can be corrected
 
 
@@ -96,8 +98,8 @@ def scale_remainders(group: SkeletonGroup, pose: Pose, constant: Floats) -> Floa
     for i, (node, parent) in enumerate(zip(group.joints, group.parents.tolist(), strict=True)):
         scale = pose.scale[:, node]
         wanted = scale[0] * ((1.0 if parent < 0 else constant[parent]) / constant[i])
-        stored = wanted.astype(np.float16).astype(np.float64)
-        if stored.all() and _is_constant(scale, scale[0]):
+        stored = _as_float16(wanted).astype(np.float64)
+        if stored.all() and np.isfinite(stored).all() and _is_constant(scale, scale[0]):
             found[i] = wanted / stored
     return found
 
@@ -107,7 +109,10 @@ def _is_constant(rows: Floats, value: Floats | float) -> bool:
 
 
 def joint_samples(group: SkeletonGroup, posed: PosedSkeleton, constant: Floats) -> JointSamples:
-    """Return the joints' transforms without their `constant_scales`, rounded as they are stored."""
+    """Return the joints' transforms without their `constant_scales`, rounded as they are stored.
+
+    Raises UnsupportedError for a scale beyond float16.
+    """
     frames, joints = len(posed.times), len(group.joints)
     local = _local_matrices(group, posed)
     found = JointSamples(
@@ -121,13 +126,33 @@ def joint_samples(group: SkeletonGroup, posed: PosedSkeleton, constant: Floats) 
         above = 1.0 if parent < 0 else constant[parent]
         rotation, scale = _rotation_and_scale(group.joints[i], posed)
         found.rotation[:, i] = rotation
-        found.scale[:, i] = scale * (above / constant[i])
+        found.scale[:, i] = _as_float16(scale * (above / constant[i]))
+        _check_stored(found.scale[:, i], scale, group.joints[i], posed)
         wanted = local[i][..., 3] * above
         found.translation[:, i] = wanted if parent < 0 else _corrected(wanted, exact[i][..., 3], stored[parent])
         parts = (found.translation[:, i], found.rotation[:, i], found.scale[:, i])
         own = matrix.from_trs(*(each.astype(np.float64) for each in parts))
         stored[i] = own if parent < 0 else matrix.multiply(stored[parent], own)
     return found
+
+
+def _as_float16(scale: Floats) -> AnyArray:
+    """The scales as float16, infinite beyond its largest number."""
+    with np.errstate(over="ignore"):
+        return scale.astype(np.float16)
+
+
+def _check_stored(stored: AnyArray, scale: Floats, node: int, posed: PosedSkeleton) -> None:
+    """Raise UnsupportedError unless the stored scales (F, 3) are finite: programs show nothing of infinite ones."""
+    beyond = ~np.isfinite(stored)
+    if not beyond.any():
+        return
+    frame, axis = np.argwhere(beyond)[0].tolist()
+    name = posed.skeleton.display_name(node)
+    raise UnsupportedError(
+        f"joint '{name}' has a scale of {scale[frame, axis]:g} at {posed.times[frame]:g} s, "
+        f"and USD stores scales of joints as float16, up to {MAX_FLOAT16:g}"
+    )
 
 
 def _local_matrices(group: SkeletonGroup, posed: PosedSkeleton) -> Floats:

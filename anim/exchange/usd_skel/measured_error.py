@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from anim.arrays import Floats
+from anim.errors import DataRangeError
 from anim.exchange.usd_skel.sample_times import add_times
 from anim.exchange.usd_skel.stage_points import StagePoints
 from anim.model import Clip, Scene
@@ -29,7 +31,7 @@ def stage_error(
 ) -> StageError:
     """Return the largest error at `times` (F,) s, whose time codes have samples, at all keys, and half-way between.
 
-    prims: the Mesh prim of each instance, by node.
+    prims: the Mesh prim of each instance, by node. Raises DataRangeError where a vertex of the stage is not finite.
     """
     if not prims:
         return StageError(0.0, float(times[0]))
@@ -41,7 +43,10 @@ def stage_error(
     for chunk in baker.bake(clip, times=measured).chunks():
         for i, expected in enumerate(chunk.positions):
             time = float(measured[chunk.first + i])
-            most = max(most, StageError(_distance(points.at(code_of.get(time, time * rate)), expected), time))
+            distance = _distance(points.at(code_of.get(time, time * rate)), expected)
+            if not math.isfinite(distance):  # NaN would be less than any error
+                raise DataRangeError(f"vertices are not finite at {time:g} s as USD skins them")
+            most = max(most, StageError(distance, time))
     return most
 
 
@@ -54,5 +59,5 @@ def _measured_times(times: Floats) -> Floats:
 
 
 def _distance(found: Floats, expected: Floats) -> float:
-    difference = found - expected
+    difference = np.subtract(found, expected, dtype=np.float64)  # squares of 1e20 m are beyond float32
     return float(np.sqrt((difference * difference).sum(axis=1).max(initial=0.0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,8 @@ INK, FAINT = (56, 58, 62), (120, 123, 128)  # sRGB
 FONT_SIZE = 14  # pixels of an em
 LINE = 19  # pixels from one line of text to the next
 BAR = 120, 8  # pixels of the heat's legend
+MAX_LINES = 3  # of a heading
+ELLIPSIS = "..."  # in ASCII, which the font has
 SPACE = 40  # pixels between title and legend
 
 Image = NDArray[np.uint8]
@@ -45,18 +48,38 @@ def width(text: str) -> int:
 
 
 def wrap_text(text: str, pixels: int) -> list[str]:
-    """Return a text in lines of at most `pixels`, broken after spaces and punctuation if possible.
+    """Return a text in at most three lines of at most `pixels`, broken after spaces and punctuation if possible.
 
+    A longer one ends with "...".
     wrap_text("Dualwield_Melee_Attack_Chop", 120) → ["Dualwield_Melee_", "Attack_Chop"]
     """
-    lines = []
-    while width(text) > pixels and len(text) > 1:
-        most = next(n for n in range(len(text) - 1, 0, -1) if n == 1 or width(text[:n]) <= pixels)
+    lines: list[str] = []
+    while len(lines) < MAX_LINES - 1:
+        most = _fitting(text, pixels)
+        if most >= len(text):
+            break
         cut = max((text[:most].rfind(mark) for mark in " _-./|:"), default=-1) + 1
         cut = cut if cut > most // 3 else most
         lines.append(text[:cut].rstrip())
         text = text[cut:].lstrip()
-    return [*lines, text] if text or not lines else lines
+    return [*lines, shorten(text, pixels)] if text or not lines else lines
+
+
+def shorten(text: str, pixels: int) -> str:
+    """Return a text, or as many of its first letters as fit into `pixels` with "..." behind them."""
+    if _fitting(text, pixels) >= len(text):
+        return text
+    room = max(pixels - width(ELLIPSIS), 1)
+    return text[: _fitting(text, room)] + ELLIPSIS
+
+
+def _fitting(text: str, pixels: int) -> int:
+    """The number of first letters that fit into `pixels`, at least one of a text that has any.
+
+    Found by halves among so many that the rest of a name of 100 000 letters is never measured.
+    """
+    most = min(len(text), pixels + 1)  # the narrowest letters are more than a pixel wide
+    return max(bisect_right(range(1, most + 1), pixels, key=lambda n: width(text[:n])), min(most, 1))
 
 
 def header_width(title: str, legend: str) -> int:

@@ -94,7 +94,9 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     per_line, pitch = _grid(width)
     columns = max(_columns(row, per_line)[0] for row in rows)
     across = max(columns * pitch - GAP, _header_width(rows, title))
-    tall = header + sum(_clip_height(clip, per_line, height) for clip in clips) + EDGE - GAP
+    headings = [captions.wrap_text(clip[0].heading, across) if clip[0].heading else [] for clip in clips]
+    heights = [_clip_height(*each, per_line, height) for each in zip(clips, headings, strict=True)]
+    tall = header + sum(heights) + EDGE - GAP
     wide = across + 2 * EDGE
     size = (SHEET_BYTES + ENCODED_BYTES) * tall * wide
     _check_memory(f"a picture of {wide} × {tall} pixels", size, camera)
@@ -102,20 +104,20 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     captions.write_header(sheet, title, _legend(rows), left=EDGE, top=EDGE - GAP)
     scenery = _setup_scene(extent, camera)
     top = header
-    for clip in clips:
-        words = captions.wrap_text(clip[0].heading, across) if clip[0].heading else []
+    for clip, words, clip_height in zip(clips, headings, heights, strict=True):
         for i, line in enumerate(words):
             captions.write(sheet, line, EDGE, top + CLIP_SPACING_PX + i * LINE)
         begin = top + len(words) * LINE + (CLIP_SPACING_PX if words else 0)
         for r, row in enumerate(clip):
             _draw_row(sheet, row, _frames(row, scenery, most, look), begin, (r, len(clip)), per_line, (width, height))
-        top += _clip_height(clip, per_line, height)
+        top += clip_height
     return sheet
 
 
-def _clip_height(clip: Sequence[Strip], per_line: int, height: int) -> int:
+def _clip_height(clip: Sequence[Strip], words: Sequence[str], per_line: int, height: int) -> int:
+    """Pixels of all rows of a clip, below the lines of its heading."""
     lines = max(_columns(row, per_line)[1] for row in clip)
-    heading = LINE + CLIP_SPACING_PX if clip[0].heading else 0
+    heading = len(words) * LINE + CLIP_SPACING_PX if words else 0
     return heading + lines * len(clip) * (height + _footer(clip[0]))
 
 

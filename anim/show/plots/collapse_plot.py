@@ -6,7 +6,19 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from anim.arrays import Floats
-from anim.show.plots.figure import ACCENT, COLORS, HAIR, LINE, SMALL, SOFT, TITLE, Figure, separate_labels, style
+from anim.show.plots.figure import (
+    ACCENT,
+    COLORS,
+    HAIR,
+    LINE,
+    SMALL,
+    SOFT,
+    TITLE,
+    Figure,
+    annotate,
+    separate_labels,
+    style,
+)
 from anim.skinning.analysis.collapse import LOW_INDEX
 from anim.skinning.analysis.recommendations import CollapseFinding
 
@@ -91,8 +103,8 @@ def _draw_volumes(axes: Axes, times: Floats, volumes: dict[str, Floats], scale: 
     places = separate_labels(ends, (high - low) * 0.13, low, high)
     for i, (method, volume) in enumerate(volumes.items()):
         axes.plot(times, 100 * volume, color=COLORS[i], linewidth=LINE)
-        axes.annotate(
-            method, (1, places[i]), xycoords=("axes fraction", "data"), xytext=(5, 0), textcoords="offset points",
+        annotate(
+            axes, method, (1, places[i]), xycoords=("axes fraction", "data"), xytext=(5, 0), textcoords="offset points",
             va="center", fontsize=SMALL, color=COLORS[i], annotation_clip=False,
         )  # fmt: skip
     _fit(axes, times)

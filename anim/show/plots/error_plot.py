@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING
 
 from anim.arrays import Floats
 from anim.measure.error.error_curve import ErrorCurve
-from anim.show.plots.figure import COLORS, HAIR, INK, SMALL, SOFT, TITLE, Figure, format_number, style, text_width
+from anim.show.plots.figure import (
+    COLORS,
+    HAIR,
+    INK,
+    SMALL,
+    SOFT,
+    TITLE,
+    Figure,
+    annotate,
+    format_number,
+    style,
+    text_width,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,9 +95,9 @@ def _draw(axes: Axes, profile: ErrorCurve, names: Sequence[str], factor: float, 
     axes.plot(times, error, color=INK, linewidth=0.8, marker="o" if len(times) == 1 else None)
     for i in reversed(range(len(profile.joints))):  # the worst is drawn last
         axes.plot(times, factor * profile.joints[i].error, color=COLORS[i], linewidth=THIN)
-        axes.annotate(
-            names[i], (1, 1 - i * NAME_SPACING), xycoords="axes fraction", xytext=(6, 0), textcoords="offset points",
-            va="top", fontsize=SMALL, color=COLORS[i], annotation_clip=False,
+        annotate(
+            axes, names[i], (1, 1 - i * NAME_SPACING), xycoords="axes fraction", xytext=(6, 0),
+            textcoords="offset points", va="top", fontsize=SMALL, color=COLORS[i], annotation_clip=False,
         )  # fmt: skip
     if limit is not None and factor * limit <= high:
         axes.axhline(factor * limit, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))

@@ -78,7 +78,7 @@ class Figure:
     def text(self, x: float, y: float, words: str, **style: Any) -> float:
         """Write text with its first baseline at x, y, and return its width in inches."""
         style = {"fontsize": TEXT, "va": "baseline", "ha": "left", "parse_math": False, **style}
-        words = _shorten(words)
+        words = plain_text(words)
         self.figure.text(x / self.width, 1 - (self.offset + y) / self.height, words, **style)
         return text_width(words, style["fontsize"], style.get("weight", "normal"))
 
@@ -123,13 +123,22 @@ def text_width(words: str, points: float, weight: str = "normal") -> float:
     from matplotlib.textpath import text_to_path
 
     font = FontProperties(weight=weight, size=points)
-    width, _, _ = text_to_path.get_text_width_height_descent(_shorten(words), font, ismath=False)
+    width, _, _ = text_to_path.get_text_width_height_descent(plain_text(words), font, ismath=False)
     return float(width) / POINTS
 
 
-def _shorten(words: str) -> str:
-    """The start of a text that is wider than any figure; a name of a file can have 100 000 characters."""
-    return words if len(words) <= MAX_CHARACTERS else words[: MAX_CHARACTERS - 1] + "…"
+def annotate(axes: Axes, words: str, at: tuple[float, float], **style: Any) -> None:
+    """Write text at a point of axes; `$` stands for itself, as names may have it."""
+    axes.annotate(plain_text(words), at, parse_math=False, **style)
+
+
+def plain_text(words: str) -> str:
+    """Return the start of a text that is wider than any figure, without characters that can't be drawn.
+
+    A name of a file can have 100 000 characters, control characters, which XML forbids, and lone surrogates.
+    """
+    words = words if len(words) <= MAX_CHARACTERS else words[: MAX_CHARACTERS - 1] + "…"
+    return "".join(c if c.isprintable() else "�" for c in words)
 
 
 def format_number(number: float) -> str:

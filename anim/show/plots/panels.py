@@ -11,7 +11,19 @@ import numpy as np
 from anim.arrays import Floats
 from anim.model import Interpolation, Track, ValueKind
 from anim.show.plots import panel_axes, polylines
-from anim.show.plots.figure import COLORS, HAIR, INK, LINE, PAPER, SMALL, SOFT, SPEED, format_number, separate_labels
+from anim.show.plots.figure import (
+    COLORS,
+    HAIR,
+    INK,
+    LINE,
+    PAPER,
+    SMALL,
+    SOFT,
+    SPEED,
+    annotate,
+    format_number,
+    separate_labels,
+)
 from anim.show.plots.panel_axes import ROUND_ANGLES
 from anim.show.plots.polylines import Polyline
 from anim.show.plots.rotations import (
@@ -239,7 +251,7 @@ def _component_names(axes: Axes, each: PlotTrack, last: Floats) -> None:
     beside = {"xycoords": ("axes fraction", "data"), "xytext": (6, 0), "textcoords": "offset points", "va": "center"}
     for c, place in zip(upwards, places, strict=True):
         color = _color(each, c)
-        axes.annotate(each.labels[c][:16], (1, place), color=color, fontsize=LABEL, parse_math=False, **beside)
+        annotate(axes, each.labels[c][:16], (1, place), color=color, fontsize=LABEL, **beside)
     rest = len(last) - len(colored)
     if rest:
         above = {"xycoords": "axes fraction", "xytext": (0, 4), "textcoords": "offset points", "ha": "right"}

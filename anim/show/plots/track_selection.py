@@ -19,6 +19,7 @@ from anim.measure.inspect import frame_rate
 from anim.model import Clip, Interpolation, Skeleton, Track, ValueKind, parse_weight_pointer
 from anim.operations.selection import Selection
 from anim.show.plots import polylines
+from anim.show.plots.figure import plain_text
 from anim.show.plots.moving_tracks import are_moving
 from anim.show.plots.polylines import Polyline
 from anim.show.plots.rotations import COMPONENTS, FROM_REST, RotationCurve, rotation_curve
@@ -170,8 +171,8 @@ class _ReadFile:
         if number not in self._spans:  # a search over all tracks of the clip
             self._spans[number] = clip.start, clip.end, _rate(clip)
         start, end, fps = self._spans[number]
-        name = _printable_name(reader.clip_name(clip.name, number))
-        target = _printable_name(_target(track, self._skeleton))
+        name = plain_text(reader.clip_name(clip.name, number))
+        target = plain_text(_target(track, self._skeleton))
         rest = IDENTITY if track.node is None else self._skeleton.rotation[track.node]
         labels = _labels(track, self._targets, self._view)
         return PlotTrack(name, target, _align(track), labels, start, end, fps, None, self._view, rest)
@@ -237,9 +238,9 @@ def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[s
     if found.target is not None:
         if count > 1:  # of an invalid file: values of another width
             return ()
-        return (_printable_name(names[found.target]) if found.target < len(names) else f"target {found.target}",)
+        return (plain_text(names[found.target]) if found.target < len(names) else f"target {found.target}",)
     if len(names) == count:
-        return _shorten([_printable_name(name) for name in names])
+        return _shorten([plain_text(name) for name in names])
     return tuple(f"target {i}" for i in range(count))
 
 
@@ -262,11 +263,6 @@ def _target_names(owner: Mapping[str, Any]) -> tuple[str, ...]:
     extras = owner.get("extras")
     names = extras.get("targetNames") if isinstance(extras, dict) else None
     return tuple(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
-
-
-def _printable_name(name: str) -> str:
-    """A name without control characters, which are invalid in XML."""
-    return "".join(c if c.isprintable() else "�" for c in name)
 
 
 def _shorten(names: Sequence[str]) -> tuple[str, ...]:

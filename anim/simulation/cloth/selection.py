@@ -31,9 +31,7 @@ def select_vertices(
     """
     kind, _, rest = selector.partition(":")
     if selector in SIDES:
-        axis, sign = "xyz".index(selector[0]), 1 if selector.endswith("min") else -1
-        along = sign * positions[:, axis]
-        chosen = along <= along.min() + SIDE_FRACTION * np.ptp(along)
+        chosen = _at_side(selector, positions)
     elif kind == "joint":
         chosen = _joint_weights(rest, instance, joint_names) >= MIN_JOINT_WEIGHT
     elif kind == "weight":
@@ -47,6 +45,14 @@ def select_vertices(
     if not chosen.any():
         raise NotFoundError(f"'{selector}' selects no vertex of mesh '{instance.mesh.name}'")
     return np.asarray(chosen)
+
+
+def _at_side(side: str, positions: Floats) -> Bools:
+    axis, sign = "xyz".index(side[0]), 1 if side.endswith("min") else -1
+    along = sign * positions[:, axis]
+    if not len(along):  # a box around nothing has no sides
+        return np.zeros(0, bool)
+    return np.asarray(along <= along.min() + SIDE_FRACTION * np.ptp(along))
 
 
 def _joint_weights(glob: str, instance: MeshInstance, names: Sequence[str]) -> Floats:

@@ -196,7 +196,12 @@ def command(
         )
     with commit_report_after(run.report, report, dry_run=dry_run):
         saved = cache_files.save(
-            cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
+            cache,
+            output,
+            caches.write_options(ending, given | {"max_error": meters}),
+            ending=ending,
+            dry_run=dry_run,
+            input=documents.PIPE if source.folder is None else source.name,
         )
     saved.report(reporter)
     name = "stdout" if output == documents.PIPE else output

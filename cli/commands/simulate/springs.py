@@ -184,7 +184,7 @@ def _chains(
     joints = {int(joint) for _, skin in reader.skins(document) for joint in skin.joints}
     bones = SpringBones(())
     if file is not None:
-        with documents.content(file, ending=".json", read=resolver.read_settings) as (data, _):
+        with documents.content(file, ending=".json", read=resolver.read_options) as (data, _):
             bones = read_spring_file(data.tobytes(), skeleton, skin_joints=joints, has_chains=not globs)
     elif not globs:
         bones = read_spring_bones(document)

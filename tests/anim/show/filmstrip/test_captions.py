@@ -55,11 +55,25 @@ def test_long_names_are_broken_behind_their_marks(text: str, pixels: int, lines:
 
 
 def test_a_name_without_marks_is_broken_anywhere() -> None:
-    lines = captions.wrap_text("x" * 50, 118)
-    assert "".join(lines) == "x" * 50
+    lines = captions.wrap_text("x" * 40, 118)
+    assert "".join(lines) == "x" * 40
     assert len(lines) > 2
     assert all(captions.width(line) <= 118 for line in lines)
     assert captions.wrap_text("xxx", 1) == ["x", "x", "x"], "a letter that is too wide stands alone"
+
+
+@pytest.mark.parametrize("name", ["A" * 500, "a b " * 25_000, "i" * 100_000])
+def test_long_names_take_a_few_lines(name: str, written: list[tuple[str, int, int]]) -> None:
+    """Headings of more than one line were drawn over what follows, and every start of a long one was measured."""
+    lines = captions.wrap_text(name, 300)
+    assert len(lines) == 3
+    assert lines[-1].endswith("...")
+    assert all(captions.width(line) <= 300 for line in lines)
+    image = filmstrip([row(name, 2), row(name, 2, clip=1)], EXTENT, look=SMALL)
+    places = [y for text, _, y in written if text]
+    assert places == sorted(places)
+    assert places[-1] + captions.LINE <= image.shape[0]
+    next(animate_frames([row(name, 2), row(name, 2)], EXTENT, look=SMALL))
 
 
 def test_clips_of_one_name_come_one_after_the_other_too(written: list[tuple[str, int, int]]) -> None:

@@ -31,6 +31,15 @@ def test_clips_and_their_worst_joints_are_named() -> None:
     assert "largest distance, m over s  ·  max 1.5 m" in said
 
 
+@pytest.mark.parametrize("kind", ["svg", "png"])
+@pytest.mark.parametrize("name", ["$$", r"$\input{a}$", "\ud83d", "a\0\nb", "x" * 100_000])
+def test_names_of_any_characters_are_drawn(name: str, kind: str) -> None:
+    """Two dollars were taken for a formula, and a lone surrogate for a character of the font."""
+    drawn = error_plot([_profile(name, 0.1, name, "hand")], title=name, kind=kind, note=name)
+    if kind == "svg" and name.startswith("$"):
+        assert words(drawn).count(name) == 4
+
+
 def test_as_many_clips_as_fit() -> None:
     said = words(error_plot([_profile(f"clip {i}", 0.01, "j") for i in range(LIMIT + 3)], title="t", kind="svg"))
     assert f"clip {LIMIT - 1}" in said

@@ -13,7 +13,7 @@ from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.simulation.cloth.hierarchy import build_hierarchy
 from anim.simulation.cloth.model import Fabric
-from anim.simulation.cloth.selection import select_vertices
+from anim.simulation.cloth.selection import SIDES, select_vertices
 from anim.simulation.cloth.tethers import tether_lengths
 from anim.simulation.cloth.topology import build_topology, color_order
 from tests.anim.simulation.cloth.cases import (
@@ -65,6 +65,13 @@ def test_selectors_without_sense_are_refused(selector: str, error: type[Exceptio
     instance = scene.instances[0]
     with pytest.raises(error):
         select_vertices(selector, instance, instance.mesh.positions, scene.skeleton.names, ["skin"])
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_mesh_without_vertices_has_no_sides(side: str) -> None:
+    scene = reader.scene(container.read(np.frombuffer(fixtures.build("arm"), np.uint8)))
+    with pytest.raises(NotFoundError, match=f"'{side}' selects no vertex"):
+        select_vertices(side, scene.instances[0], np.zeros((0, 3)), scene.skeleton.names, [])
 
 
 def test_vertices_are_selected_by_joint_weights_and_material() -> None:
