@@ -6,6 +6,7 @@ import hashlib
 import os
 import stat
 import sys
+import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,7 @@ import numba
 import anim
 
 KERNEL_FOLDERS = ("skinning/kernels", "simulation/cloth/kernels", "simulation/particles/kernels")  # in `anim`
+ROOM_BYTES = 1 << 20  # for machine code: a kernel takes about 100 kB
 WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -57,9 +59,18 @@ def _has_cache() -> bool:
     folder = numba.config.CACHE_DIR
     try:
         Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
-        return bool(folder) and os.access(folder, os.W_OK) and (os.name != "posix" or _is_private(folder))
+        return bool(folder) and os.access(folder, os.W_OK) and _is_usable(folder)
     except OSError:
         return False
+
+
+def _is_usable(folder: str) -> bool:
+    """Return whether a folder is the user's and has room. Raises OSError where it has none: numba would, in a bake."""
+    if os.name == "posix" and not _is_private(folder):
+        return False
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(ROOM_BYTES))
+    return True
 
 
 def _is_private(folder: str) -> bool:

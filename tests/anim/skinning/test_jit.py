@@ -97,6 +97,18 @@ def test_without_a_cache_folder_it_works_all_the_same(tmp_path: Path) -> None:
     assert _run(blocked) == _run(tmp_path / "other")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="has no such limit")
+def test_a_disk_without_room_for_code_is_no_cache(tmp_path: Path) -> None:
+    """Numba raises where it can't write: a bake would end by it."""
+    code = "from anim.skinning.kernels import jit; print(jit._has_cache())"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    for blocks, found in (("unlimited", "True"), ("100", "False")):
+        line = f'ulimit -f {blocks}; exec "{sys.executable}" -c "{code}"'
+        done = subprocess.run(["bash", "-c", line], env=environment, capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == found
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.skipif(os.name != "posix", reason="has no such modes")
 @pytest.mark.parametrize(("mode", "is_used"), [(0o700, True), (0o755, True), (0o775, False), (0o1777, False)])
 def test_code_that_others_may_have_put_there_is_not_run(
