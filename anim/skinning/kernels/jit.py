@@ -17,7 +17,7 @@ import numba
 import anim
 
 KERNEL_FOLDERS = ("skinning/kernels", "simulation/cloth/kernels", "simulation/particles/kernels")  # in `anim`
-ROOM_BYTES = 1 << 20  # for machine code: a kernel takes about 100 kB
+MIN_FREE_BYTES = 1 << 20  # for machine code: a kernel takes about 100 kB
 WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -69,7 +69,7 @@ def _is_usable(folder: str) -> bool:
     if os.name == "posix" and not _is_private(folder):
         return False
     with tempfile.TemporaryFile(dir=folder) as file:
-        file.write(bytes(ROOM_BYTES))
+        file.write(bytes(MIN_FREE_BYTES))
     return True
 
 
