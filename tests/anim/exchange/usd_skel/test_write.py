@@ -13,11 +13,10 @@ import pytest
 from anim.caches.options import ReadOptions
 from anim.caches.registry import reader_for
 from anim.caches.storage import Memory
-from anim.errors import DataRangeError, NotFoundError, UnsupportedError
+from anim.errors import NotFoundError, UnsupportedError
 from anim.exchange.usd_skel import skeleton_group
 from anim.exchange.usd_skel.sample_times import sample_times
 from anim.exchange.usd_skel.stage import StageTimes
-from anim.exchange.usd_skel.stage_points import StagePoints
 from anim.exchange.usd_skel.write import UsdSkelResult, write
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
@@ -158,46 +157,6 @@ def test_uneven_and_animated_scale_are_within_the_stated_error(tmp_path: Path) -
     error = largest_error(path, scene, played, result)
     assert MAX_ERROR_PER_DIAGONAL < error < 1e-3
     assert error * diagonal(scene) < result.error.distance * 1.01
-
-
-def _scaled(last: float) -> tuple[Memory, str, Callable[[], UsdSkelResult]]:
-    """Writes the arm with scales of its last joint from 1 to `last`."""
-    document, scene, clip = arm()
-    (instance,) = scene.instances
-    assert instance.skin is not None
-    node = int(instance.skin.joints[-1])
-    kept = [track for track in clip.tracks if (track.node, track.path) != (node, "scale")]
-    moved = Track(node, "scale", "LINEAR", [0, 1], np.array([[1, 1, 1], [1, last, 1]]))
-    outputs = Memory("out.usda")
-    played = Clip("scaled", (*kept, moved))
-    return (
-        outputs,
-        scene.skeleton.display_name(node),
-        lambda: write(document, scene, played, outputs, ending=".usda", fps=5),
-    )
-
-
-@pytest.mark.parametrize("last", [1e5, 1e18, 1e30])
-def test_scales_beyond_float16_are_refused(last: float) -> None:
-    """They were written as `inf`, with an error of 0 mm: a NaN is less than any error."""
-    outputs, name, write_scaled = _scaled(last)
-    with pytest.raises(UnsupportedError, match=f"joint '{name}' has a scale of .* s, and USD stores .* up to 65504"):
-        write_scaled()
-    assert not outputs.files
-
-
-def test_scales_within_float16_are_written() -> None:
-    outputs, _, write_scaled = _scaled(65504.0)
-    write_scaled()
-    assert b"(inf" not in outputs.files["out.usda"]
-
-
-def test_vertices_of_a_stage_that_are_not_finite_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(StagePoints, "at", lambda *_: np.full((1, 3), np.nan))
-    outputs, _, write_scaled = _scaled(2.0)
-    with pytest.raises(DataRangeError, match="vertices are not finite at 0 s as USD skins them"):
-        write_scaled()
-    assert not outputs.files
 
 
 def test_nodes_that_mirror_and_shear(tmp_path: Path) -> None:
