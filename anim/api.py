@@ -86,6 +86,7 @@ def optimize(
     max_angle: of any node's local rotation, "0.5deg" or radians. max_speed_error: per second, of any vertex.
     keep_nodes: globs for nodes with exact motion. drop: "rest", "unused" or "never", removed channels at the rest pose.
     meshopt: "ext" or "khr" for compression by that extension. effort: "fast", "balanced" or "max".
+    progress: called with the fraction done of a search, of which `max_bytes` needs several.
     workers: processes, 0 for one per core; a script with more than one needs `if __name__ == "__main__":`.
     The result is the asset itself if nothing gets smaller.
     optimize("walk.glb", max_error="0.5mm").save("small.glb")
@@ -139,7 +140,8 @@ def optimize(
     else:
         ceiling = None if max_error is None else limits.max_error
         request, found = ByteLimit(optimizer, limit, request, ceiling).run()
-    return _build_result(asset, found, request.bounds, chosen)
+    document, _ = optimizer.choose_document(found)
+    return _build_result(asset, replace(asset, document=document), found, request.bounds, chosen)
 
 
 def bake(
@@ -243,7 +245,9 @@ def sample_poses(
     return sample_table(asset.skeleton, playing, _times(playing, fps, times), space=space)
 
 
-def _build_result(asset: Asset, found: Optimized, limits: Bounds, chosen: Sequence[int]) -> OptimizeResult:
+def _build_result(
+    asset: Asset, smaller: Asset, found: Optimized, limits: Bounds, chosen: Sequence[int]
+) -> OptimizeResult:
     bad = [i for i, each in found.verdicts.items() if not each.holds]
     if bad:
         off = found.verdicts[bad[0]].error
@@ -254,8 +258,7 @@ def _build_result(asset: Asset, found: Optimized, limits: Bounds, chosen: Sequen
     for i in chosen:
         error = found.verdicts[i].error.max_error if i in found.verdicts else 0.0
         errors[f"#{i}" if names[i] in errors else names[i]] = error
-    smaller = replace(asset, document=found.document)
-    if found.unchanged or _glb_size(found.document) >= _glb_size(asset.document):
+    if smaller.document is asset.document:
         return OptimizeResult(asset, 0.0, dict.fromkeys(errors, 0.0))
     return OptimizeResult(smaller, max(errors.values(), default=0.0), errors)
 

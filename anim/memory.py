@@ -35,9 +35,9 @@ def limit_for(file_bytes: int) -> int:
 
 @contextmanager
 def limit_allocations(size: int) -> Iterator[None]:
-    """Let allocations fail inside the block, on Linux, once the process has `size` bytes of data.
+    """Let allocations fail inside the block, on Linux, beyond `size` bytes of the process's data.
 
-    For native packages that count nothing. Half of `size` can be allocated, however much the process has already.
+    Or beyond half of `size` more than it has, if that is more. For native packages that count nothing.
     """
     used = _data_bytes()
     if used is None:

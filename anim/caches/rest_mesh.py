@@ -17,7 +17,7 @@ from anim.arrays import Floats, Ints
 from anim.caches import frame_blocks
 from anim.caches.formats import mesh_frame
 from anim.caches.formats.mesh_frame import MeshFrame
-from anim.caches.storage import Inputs, Outputs, companion_name, read_all, suffix
+from anim.caches.storage import Inputs, Outputs, companion_name, open_bytes, suffix
 from anim.errors import FormatError, RangeError
 from anim.model import VertexCache
 
@@ -91,7 +91,7 @@ def positions(cache: VertexCache) -> Floats:
 
 def _opened(inputs: Inputs, name: str) -> MeshFrame:
     try:
-        with read_all(inputs, name) as data:
+        with open_bytes(inputs, name) as data:
             return mesh_frame.read(data, suffix(name))
     except FormatError as error:
         raise error.at(f"'{name}'", " ") from None

@@ -89,7 +89,7 @@ def size_of(file: BinaryIO) -> int:
 
 
 @contextmanager
-def read_all(inputs: Inputs, name: str) -> Iterator[bytes]:
+def open_bytes(inputs: Inputs, name: str) -> Iterator[bytes]:
     """Yield all bytes of a file."""
     with inputs.open(name) as file:
         yield resolver.read_all(file)

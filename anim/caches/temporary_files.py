@@ -17,6 +17,8 @@ from anim.errors import OutputError, not_written
 from anim.files import resolver
 from anim.memory import limit_for
 
+ADVICE = "TMPDIR names another folder for it"
+
 
 @contextmanager
 def temporary_folder() -> Iterator[str]:
@@ -24,7 +26,7 @@ def temporary_folder() -> Iterator[str]:
     try:
         made = tempfile.TemporaryDirectory()
     except OSError as error:
-        raise not_written("a temporary folder", error).advise("TMPDIR names another folder for it") from None
+        raise not_written("a temporary folder", error).advise(ADVICE) from None
     with made as folder:
         yield folder
 
@@ -81,8 +83,12 @@ def temp_input(inputs: Inputs, name: str, ending: str) -> Iterator[str]:
     """Yield a path from which the bytes of an input can be read."""
     with temporary_folder() as folder:
         path = Path(folder) / f"input{ending}"
-        with inputs.open(name) as source, path.open("wb") as target:
-            target.writelines(resolver.read_blocks(source, limit_for(0), block=COPY_BYTES))
+        with inputs.open(name) as source:
+            try:
+                with path.open("wb") as target:
+                    target.writelines(resolver.read_blocks(source, limit_for(0), block=COPY_BYTES))
+            except OSError as error:
+                raise not_written("a temporary file", error).advise(ADVICE) from None
         yield str(path)
 
 

@@ -34,7 +34,12 @@ class CompanionFiles:
         return self._files[address]
 
 
-def read_file(path: Path, ending: str = ".glb", *, read: Callable[[io.BufferedReader], bytes] | None = None) -> Bytes:
+def read_all(file: BinaryIO) -> bytes:
+    """Return all bytes of an open file. Raises UnsupportedError for a pipe or device above the memory limit."""
+    return file.read() if _has_size(file) else b"".join(read_blocks(file, limit_for(0)))
+
+
+def read_file(path: Path, ending: str = ".glb", *, read: Callable[[io.BufferedReader], bytes] = read_all) -> Bytes:
     """Return the bytes of a file, read-only. ending: expected extension, for the hint about a folder.
 
     A copy instead of a memory map: the system kills a process whose mapped file is rewritten in place by another.
@@ -43,7 +48,7 @@ def read_file(path: Path, ending: str = ".glb", *, read: Callable[[io.BufferedRe
         if path.is_dir():
             raise FormatError("is a folder", help=_in_folder(path, ending))
         with path.open("rb") as file:
-            return np.frombuffer((read or read_all)(file), np.uint8)
+            return np.frombuffer(read(file), np.uint8)
     except OSError as error:
         raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})") from None
 
@@ -62,11 +67,6 @@ def read_gltf(file: io.BufferedReader) -> bytes:
         return file.read()  # at once: blocks would take their memory twice
     stated = int.from_bytes(head[8:12], "little") * is_glb
     return b"".join(read_blocks(file, max(limit_for(0), stated)))
-
-
-def read_all(file: BinaryIO) -> bytes:
-    """Return all bytes of an open file. Raises UnsupportedError for a pipe or device above the memory limit."""
-    return file.read() if _has_size(file) else b"".join(read_blocks(file, limit_for(0)))
 
 
 def read_options(file: BinaryIO) -> bytes:

@@ -72,11 +72,8 @@ class FastSizes:
             return self.first[0]
         request = self._request.with_bound(max_error)
         if max_error == 0.0 or self.sample == self.clips:
-            return self._file.measure_point(
-                max_error, self._file.run(self._request.with_bound(max_error), verified=False)
-            )
+            return self._file.measure_point(max_error, self._file.run(request, verified=False))
         point, first = self.first
-        request = self._request.with_bound(max_error)
         total = sum(first[i] for i in self.sample)
         found = sum(estimate_sizes(self._file.search(request, self.sample, verified=False), request).values())
         animation = round(point.animation * found / max(total, 1.0))

@@ -22,7 +22,7 @@ FAST = "fast"  # effort of sizes that are only compared
 Progress: TypeAlias = Callable[[], AbstractContextManager[Callable[[float], None]]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FileOptimizer:
     """A file, its clips, and how they are optimized.
 

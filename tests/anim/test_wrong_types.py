@@ -42,7 +42,6 @@ SHAPES: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "facade fps": (lambda: anim.sample(ASSET, fps=TEXT), "`fps` is '10'"),
     "facade times": (lambda: anim.sample(ASSET, times="x"), "times holds something that is no number"),
-    "facade bound": (lambda: anim.optimize(ASSET, max_error=True), "`max_error` is True"),
     "player": (lambda: anim.diff(ASSET, ASSET, player=NONE), "player is None"),
     "list of clips": (lambda: writer.replace_clips(ASSET.document, CLIPS), "clips is list"),
     "path": (lambda: anim.save(ASSET, NONE), "path is None"),

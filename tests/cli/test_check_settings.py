@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tomllib
 from pathlib import Path
 
@@ -53,6 +54,7 @@ def test_wrong_settings_are_refused(text: str, words: str, folder: Path, call: C
     assert "sys." not in run.err
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes")
 @pytest.mark.parametrize("against", ["fifo", "/dev/zero", "crowd", "x" * 5000])
 def test_sources_of_budgets_are_regular_files(against: str, folder: Path, call: Call) -> None:
     """A check waited for a writer of the pipe."""
@@ -75,6 +77,7 @@ def test_sources_of_budgets_are_regular_files(against: str, folder: Path, call: 
         ("long", 4, "has more than 10 MB"),
     ],
 )
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes")
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_settings_are_a_short_regular_file(
     command: str, kind: str, code: int, words: str, folder: Path, call: Call

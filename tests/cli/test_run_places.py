@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ from tests.cli.running import built, refusal
 from tests.cli.running_recipes import write_crowd, write_recipe
 
 PLAIN = "resample --fps 12"
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes, and links need a right")
 
 
 @pytest.mark.parametrize(

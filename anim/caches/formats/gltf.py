@@ -11,7 +11,7 @@ import numpy as np
 from anim.caches.formats import gltf_flipbook, gltf_morph
 from anim.caches.formats.flipbook_reader import read_pages
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.storage import Inputs, Memory, Outputs, companion_name, read_all
+from anim.caches.storage import Inputs, Memory, Outputs, companion_name, open_bytes
 from anim.errors import NotFoundError, RangeError
 from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container
@@ -70,7 +70,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
     Morph targets and skins (linear blend) are evaluated at the clip's own keys, or at `reading.input_fps`.
     """
-    with read_all(inputs, inputs.main) as data:
+    with open_bytes(inputs, inputs.main) as data:
         document = container.read(np.frombuffer(data, np.uint8), lambda name: _beside(inputs, name))
     found = read_pages(document)
     if found is not None:
@@ -82,7 +82,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 
 def _beside(inputs: Inputs, name: str) -> Bytes:
-    with read_all(inputs, name) as data:
+    with open_bytes(inputs, name) as data:
         return np.frombuffer(data, np.uint8)
 
 

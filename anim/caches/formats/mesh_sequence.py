@@ -13,7 +13,7 @@ from anim.caches import frame_blocks
 from anim.caches.formats import mesh_frame
 from anim.caches.formats.mesh_materials import mesh_materials, write_library
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.storage import Inputs, Outputs, companion_name, read_all
+from anim.caches.storage import Inputs, Outputs, companion_name, open_bytes
 from anim.caches.transforms import statistics
 from anim.errors import FormatError
 from anim.model import FrameChunk, VertexCache
@@ -32,7 +32,7 @@ def read(inputs: Inputs, reading: ReadOptions, *, ending: str) -> VertexCache:
     gives the faces; every other must have as many vertices.
     """
     names = sequence_members(inputs)
-    with read_all(inputs, names[0]) as data:
+    with open_bytes(inputs, names[0]) as data:
         first = mesh_frame.read(data, ending)
     names = _of_one_sequence(inputs.main, names, first.remark.get("frames", ""))
     return VertexCache(
@@ -129,7 +129,7 @@ def _chunks(inputs: Inputs, names: Sequence[str], start: mesh_frame.MeshFrame, e
     for first in range(0, len(names), step):
         stills = []
         for name in names[first : first + step]:
-            with read_all(inputs, name) as data:
+            with open_bytes(inputs, name) as data:
                 frame = mesh_frame.read(data, ending)
             if len(frame.positions) != vertices:
                 raise FormatError(f"'{name}' has {len(frame.positions)} vertices (the first has {vertices})")

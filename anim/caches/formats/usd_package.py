@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+
+from anim.caches.temporary_files import temporary_folder
 
 ARCHIVE_TIME_S = 315_532_800  # 1980-01-01, the first time of a ZIP file; else the clock is in the bytes
 
@@ -14,7 +15,7 @@ def write_package(path: str, stage: str, images: Sequence[tuple[str, bytes]], *,
     """Write a .usdz at `path` from a stage's file, which comes first as `name`, and images by name."""
     from pxr import Sdf
 
-    with tempfile.TemporaryDirectory() as folder, Sdf.ZipFileWriter.CreateNew(path) as package:
+    with temporary_folder() as folder, Sdf.ZipFileWriter.CreateNew(path) as package:
         os.utime(stage, (ARCHIVE_TIME_S, ARCHIVE_TIME_S))
         package.AddFile(stage, name)
         for name, data in images:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection
 
 from anim.gltf.document import Json, json_array
-from anim.gltf.writing.references import unknown_indices
+from anim.gltf.writing.references import possible_meshes
 
 _MESH_POINTER = re.compile(r"^/meshes/(0|[1-9][0-9]{0,8})(?=/)")
 
@@ -14,12 +14,12 @@ _MESH_POINTER = re.compile(r"^/meshes/(0|[1-9][0-9]{0,8})(?=/)")
 def drop_meshes(json: Json, candidates: Collection[int], clip: Json) -> None:
     """Remove those of the candidates that no node has, in place, and renumber the others.
 
-    clip: the baked animation, whose pointers are renumbered too. If a number in an unknown extension may be a mesh
+    clip: the baked animation, whose pointers are renumbered too. If a number in an extension may be a mesh
     after the first removed one, nothing is removed.
     """
     meshes = json_array(json, "meshes")
     gone = set(candidates) - {node["mesh"] for node in json["nodes"] if "mesh" in node}
-    if not gone or any(min(gone) <= number < len(meshes) for number in unknown_indices(json)):
+    if not gone or any(min(gone) <= number < len(meshes) for number in possible_meshes(json)):
         return
     kept = [i for i in range(len(meshes)) if i not in gone]
     number = {old: new for new, old in enumerate(kept)}

@@ -7,7 +7,7 @@ import numpy as np
 from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats import exr, png
 from anim.caches.options import ReadOptions
-from anim.caches.storage import Inputs, read_all, size_of
+from anim.caches.storage import Inputs, open_bytes, size_of
 from anim.caches.vat import metadata, presets
 from anim.caches.vat.metadata import VatMetadata
 from anim.caches.vat.presets import Preset
@@ -25,7 +25,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
     if name not in inputs.names():
         raise FormatError(f"'{name}' is not beside it, and only that says what the pixels mean")
     try:
-        with read_all(inputs, name) as data:
+        with open_bytes(inputs, name) as data:
             about = metadata.parse(data)
     except FormatError as error:
         raise error.at(f"'{name}'", ": ") from None
@@ -51,7 +51,7 @@ def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:
 
 def _mesh(inputs: Inputs, about: VatMetadata) -> tuple[Floats, Ints]:
     """Positions (V, 3) and faces of the companion mesh, whose nodes are in the order of the vertices."""
-    with read_all(inputs, about.mesh) as data:
+    with open_bytes(inputs, about.mesh) as data:
         scene = gltf.scene(container.read(np.frombuffer(data, np.uint8)))
     if scene.vertex_count != about.vertices:
         raise FormatError(f"'{about.mesh}' has {scene.vertex_count} vertices (the JSON says {about.vertices})")
@@ -66,7 +66,7 @@ def _pixels(inputs: Inputs, name: str, about: VatMetadata) -> AnyArray:
     width, height = about.width, about.rows * len(about.times)
     MemoryBudget(_stored_bytes(inputs, name)).add(3 * 8 * 4 * width * height)  # as pixels, float64 and positions
     if about.format == "unorm16":
-        with read_all(inputs, name) as data:
+        with open_bytes(inputs, name) as data:
             image: AnyArray = png.read(data, width=width, height=height)
     else:
         image = exr.read(inputs, name, width=width, height=height)

@@ -25,6 +25,8 @@ HARMLESS = frozenset(
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
 
+NAMING_MESHES = frozenset({"VRM", "KHR_physics_rigid_bodies"})  # of these extensions, by index
+
 # Properties in the longest arrays of files; by the schema each is a number or a string.
 _PLAIN = frozenset(
     """
@@ -33,6 +35,7 @@ _PLAIN = frozenset(
 )
 _CONTAINERS = (dict, list)  # of JSON
 _SCALARS = frozenset({str, int, float, bool, type(None)})  # a lookup is half as long as isinstance
+_LONG_ARRAYS = frozenset({"accessors", "bufferViews", "animations", "samplers", "channels", "target"})  # and below
 MAX_PROPERTIES = 64  # of objects that are looked at property by property
 _Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its parent's, and its key or index there
 
@@ -79,9 +82,10 @@ def sampled_accessors(samplers: Sequence[Json]) -> set[int]:
     return {*map(operator.itemgetter("input"), samplers), *map(operator.itemgetter("output"), samplers)}
 
 
-def unknown_indices(json: Json) -> set[int]:
-    """Return all whole numbers in unknown extensions: each may be an index of an accessor or view."""
-    return {number for _, part in unknown_extensions(json) for number in _whole_numbers(part)}
+def possible_meshes(json: Json) -> set[int]:
+    """Return all whole numbers in extensions that may be an index of a mesh: in unknown ones, and some others."""
+    named = unknown_extensions(json, HARMLESS - NAMING_MESHES)
+    return {number for _, part in named for number in _whole_numbers(part)}
 
 
 def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
@@ -149,38 +153,40 @@ def _of_draco(json: Json) -> Iterator[int]:
             yield from _whole_numbers(draco.get("bufferView"))
 
 
-def unknown_extensions(json: Json) -> list[tuple[str, Any]]:
-    """Return (JSON pointer, content) of unknown extensions at any depth."""
+def unknown_extensions(json: Json, known: frozenset[str] = HARMLESS) -> list[tuple[str, Any]]:
+    """Return (JSON pointer, content) of extensions that are not known, at any depth."""
     found: list[tuple[str, Any]] = []
-    extended = {key: item for key, item in json.items() if key == "extensions" or _has_extensions([item])}
-    _collect_unknown(extended, None, found)
+    extended = {key: item for key, item in json.items() if key == "extensions" or _has_extensions(key, item)}
+    _collect_unknown(extended, None, known, found)
     return found
 
 
-def _has_extensions(values: list[Any]) -> bool:
-    """Return False if there are no extensions in these values, at any depth.
+def _has_extensions(name: str, value: Any) -> bool:
+    """Return False if there are no extensions in a property of the document, at any depth.
 
-    By property over all values, in a third of the time of a walk: the long arrays of most files have none. True also
-    where types are mixed or properties many, which a walk finds out.
+    By property over all objects, in half the time of a walk: the long arrays of most files have none. True also where
+    types are mixed or properties many, which a walk finds out.
     """
-    columns = [values]
+    columns = [([value], name in _LONG_ARRAYS)]  # whether the schema knows the objects
     while columns:
-        column = columns.pop()
+        column, in_schema = columns.pop()
         kinds = set(map(type, column))
         if kinds == {list}:
-            columns.append([*chain.from_iterable(column)])
+            columns.append(([*chain.from_iterable(column)], in_schema))
         elif kinds == {dict}:
-            keys = set(chain.from_iterable(column)) - _PLAIN - {"extras"}
+            keys = set(chain.from_iterable(column)) - {"extras"} - (_PLAIN if in_schema else frozenset())
             if "extensions" in keys or len(keys) > MAX_PROPERTIES:
                 return True
-            columns += [[each[key] for each in column if key in each] for key in keys]
+            columns += [
+                ([each[key] for each in column if key in each], in_schema and key in _LONG_ARRAYS) for key in keys
+            ]
         elif not kinds <= _SCALARS:
             return True
     return False
 
 
-def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str, Any]]) -> None:
-    """Append the unknown extensions inside a value, whose pointer is `path`.
+def _collect_unknown(value: Json | list[Any], path: _Path, known: frozenset[str], found: list[tuple[str, Any]]) -> None:
+    """Append the extensions inside a value that are not known; its pointer is `path`.
 
     This goes through up to 100 000 objects: pointers are only written out where one is needed.
     """
@@ -189,12 +195,12 @@ def _collect_unknown(value: Json | list[Any], path: _Path, found: list[tuple[str
             continue
         if key == "extensions" and isinstance(item, dict):
             for name, extension in item.items():
-                if name not in HARMLESS:
+                if name not in known:
                     found.append((_pointer(((path, key), name)), extension))
                 elif isinstance(extension, _CONTAINERS):
-                    _collect_unknown(extension, ((path, key), name), found)
+                    _collect_unknown(extension, ((path, key), name), known, found)
         elif isinstance(item, _CONTAINERS):
-            _collect_unknown(item, (path, key), found)
+            _collect_unknown(item, (path, key), known, found)
 
 
 def _pointer(path: _Path) -> str:

@@ -15,7 +15,7 @@ from anim.gltf.reading import reader
 from anim.model import Clip, Track
 from anim.model.track import BYTE_UNIT_TOLERANCE
 
-MAX_STACKED_KEYS = 1 << 18  # of rotations that are looked at together
+MAX_ROTATIONS = 1 << 18  # of rotations that are looked at together
 
 
 def normalize_new(document: Document, clips: Mapping[int, Clip]) -> Mapping[int, Clip]:
@@ -65,7 +65,7 @@ def _non_unit_tracks(clip: Clip, chosen: Iterable[int]) -> list[int]:
         if clip.tracks[n].path == "rotation":
             if room <= 0:
                 parts.append([])
-                room = MAX_STACKED_KEYS
+                room = MAX_ROTATIONS
             parts[-1].append(n)
             room -= len(clip.tracks[n].times)
     return [n for part in parts for n in _non_unit_part(clip, part)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json as jsonlib
 from collections import Counter
-from functools import cache
 from itertools import chain
 from typing import NamedTuple
 
@@ -66,12 +65,6 @@ _encoder = jsonlib.JSONEncoder(separators=(",", ":"), ensure_ascii=False, check_
 
 
 def _size(accessor: Json) -> int:
-    if "bufferView" not in accessor and "sparse" not in accessor:
+    if ("bufferView" not in accessor and "sparse" not in accessor) or accessor["type"] not in buffer_layout.COMPONENTS:
         return 0
-    return int(accessor["count"]) * _element_size(accessor["componentType"], accessor["type"])
-
-
-@cache
-def _element_size(component_type: int, kind: str) -> int:
-    """Bytes of an element, 0 of a type that glTF does not know."""
-    return buffer_layout.element_size(component_type, kind) if kind in buffer_layout.COMPONENTS else 0
+    return int(accessor["count"]) * buffer_layout.element_size(accessor["componentType"], accessor["type"])

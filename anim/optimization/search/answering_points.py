@@ -61,7 +61,7 @@ class AnsweringPoints:
         chosen = np.array(nodes, np.int64)
         left = np.arange(len(chosen))
         for listed in (self._noticeable, self._any):
-            starts, ends = listed.ranges(self._first[chosen[left]], self._end[chosen[left]])
+            starts, ends = listed.find_ranges(self._first[chosen[left]], self._end[chosen[left]])
             has = starts < ends
             yield listed, left[has], starts[has], ends[has]
             left = left[~has]
@@ -75,7 +75,7 @@ class _PointList:
         order = np.argsort(at, kind="stable")
         self._at, self.point = at[order], point[order]
 
-    def ranges(self, first: Any, end: Any) -> tuple[Any, Any]:
+    def find_ranges(self, first: Any, end: Any) -> tuple[Any, Any]:
         """Start and end in `point` of what is listed at nodes from one position to before another."""
         return np.searchsorted(self._at, first), np.searchsorted(self._at, end)
 

@@ -55,25 +55,25 @@ def wrap_text(text: str, pixels: int) -> list[str]:
     """
     lines: list[str] = []
     while len(lines) < MAX_LINES - 1:
-        most = _fitting(text, pixels)
+        most = _count_fitting(text, pixels)
         if most >= len(text):
             break
         cut = max((text[:most].rfind(mark) for mark in " _-./|:"), default=-1) + 1
         cut = cut if cut > most // 3 else most
         lines.append(text[:cut].rstrip())
         text = text[cut:].lstrip()
-    return [*lines, shorten(text, pixels)] if text or not lines else lines
+    return [*lines, _shorten(text, pixels)] if text or not lines else lines
 
 
-def shorten(text: str, pixels: int) -> str:
+def _shorten(text: str, pixels: int) -> str:
     """Return a text, or as many of its first letters as fit into `pixels` with "..." behind them."""
-    if _fitting(text, pixels) >= len(text):
+    if _count_fitting(text, pixels) >= len(text):
         return text
     room = max(pixels - width(ELLIPSIS), 1)
-    return text[: _fitting(text, room)] + ELLIPSIS
+    return text[: _count_fitting(text, room)] + ELLIPSIS
 
 
-def _fitting(text: str, pixels: int) -> int:
+def _count_fitting(text: str, pixels: int) -> int:
     """The number of first letters that fit into `pixels`, at least one of a text that has any.
 
     Found by halves among so many that the rest of a name of 100 000 letters is never measured.

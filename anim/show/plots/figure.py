@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import logging
+import unicodedata
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -47,6 +48,7 @@ _STYLE: dict[str, Any] = {
     "agg.path.chunksize": 0,
 }
 MAX_CHARACTERS = 300
+UNDRAWABLE = frozenset({"Cc", "Cs", "Cn", "Zl", "Zp"})  # categories of control characters, surrogates, and breaks
 INSTALL = "pip install 'gltf-anim[plot]'"
 
 
@@ -138,7 +140,7 @@ def plain_text(words: str) -> str:
     A name of a file can have 100 000 characters, control characters, which XML forbids, and lone surrogates.
     """
     words = words if len(words) <= MAX_CHARACTERS else words[: MAX_CHARACTERS - 1] + "…"
-    return "".join(c if c.isprintable() else "�" for c in words)
+    return "".join("�" if unicodedata.category(c) in UNDRAWABLE else c for c in words)
 
 
 def format_number(number: float) -> str:

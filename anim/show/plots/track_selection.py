@@ -240,7 +240,7 @@ def _weight_names(track: Track, targets: Mapping[str, Sequence[str]]) -> tuple[s
             return ()
         return (plain_text(names[found.target]) if found.target < len(names) else f"target {found.target}",)
     if len(names) == count:
-        return _shorten([plain_text(name) for name in names])
+        return tuple(map(plain_text, _shorten(names)))
     return tuple(f"target {i}" for i in range(count))
 
 

@@ -50,10 +50,10 @@ def assemble(
         own = owned.get(node, [])
         kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
         kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
-        bodies.append(assembly.body(node, kind, motion, own))
+        bodies.append(assembly.build_body(node, kind, motion, own))
     for node in owned.get(-1, []):
         kind = BodyKind.ANIMATED if is_tracked[node] else BodyKind.STATIC
-        bodies.append(assembly.body(node, kind, REST, [node]))
+        bodies.append(assembly.build_body(node, kind, REST, [node]))
     indices = {body.node: i for i, body in enumerate(bodies)}
     joints = tuple(_joints(description, skeleton, indices, frames))
     if description.floor is not None:
@@ -96,7 +96,7 @@ class _Assembly:
         self._description, self._skeleton = description, skeleton
         self._world, self._frames = world, frames
 
-    def body(self, node: int, kind: BodyKind, motion: Motion, colliders: Sequence[int]) -> RigidBody:
+    def build_body(self, node: int, kind: BodyKind, motion: Motion, colliders: Sequence[int]) -> RigidBody:
         """Return the body of a node. colliders: nodes of those that it owns."""
         made, frame = [], self._frames[node]
         for each in colliders:

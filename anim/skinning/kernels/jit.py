@@ -65,7 +65,10 @@ def _has_cache() -> bool:
 
 
 def _is_usable(folder: str) -> bool:
-    """Return whether a folder is the user's and has room. Raises OSError where it has none: numba would, in a bake."""
+    """Return whether a folder is the user's and has room.
+
+    Raises OSError where it has none: numba would, in a bake. Also where all code is there already, which nobody knows.
+    """
     if os.name == "posix" and not _is_private(folder):
         return False
     with tempfile.TemporaryFile(dir=folder) as file:

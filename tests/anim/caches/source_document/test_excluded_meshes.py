@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from anim.caches.source_document.excluded_meshes import drop_meshes
 
 
@@ -20,7 +22,9 @@ def test_nodes_and_pointers_are_renumbered() -> None:
     assert clip["channels"] == [channel("/meshes/1/weights/0"), node]
 
 
-def test_an_unknown_extension_that_may_name_a_mesh_keeps_all() -> None:
-    json: dict[str, Any] = {"meshes": [{}, {}], "nodes": [{"mesh": 1}], "extensions": {"ACME": {"mesh": 1}}}
+@pytest.mark.parametrize("extension", ["ACME", "VRM", "KHR_physics_rigid_bodies"])
+def test_an_extension_that_may_name_a_mesh_keeps_all(extension: str) -> None:
+    """Also where it names no accessors."""
+    json: dict[str, Any] = {"meshes": [{}, {}], "nodes": [{"mesh": 1}], "extensions": {extension: {"mesh": 1}}}
     drop_meshes(json, {0}, {"channels": []})
     assert len(json["meshes"]) == 2

@@ -242,7 +242,8 @@ def test_a_claim_of_frames_or_channels_allocates_nothing() -> None:
     ("stated", "rate", "noted"),
     [
         ("0.0333333", "30", False),
-        ("0.033", "30", False),
+        ("0.03333", "30", False),
+        ("0.1" + "0" * 2_100_000, "10", False),
         ("3.33333e-2", "30", False),
         ("0.03334", "30", True),
         ("0.0333320", "30", True),

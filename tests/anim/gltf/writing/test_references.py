@@ -97,6 +97,15 @@ def test_extensions_naming_keys(extension: Json, places: list[str]) -> None:
     assert references.extensions_naming_keys(json, [0]) == places
 
 
+@pytest.mark.parametrize("key", ["node", "input", "count", "samplers", "x"])
+@pytest.mark.parametrize("array", ["nodes", "accessors", "animations"])
+def test_extensions_below_any_property_are_found(array: str, key: str) -> None:
+    """Also below names that the schema has for numbers, in objects that it does not know."""
+    json = {array: [{}, {"foo": {key: {"extensions": {"ACME": {"accessor": 3}}}}}]}
+    ((place, _),) = references.unknown_extensions(json)
+    assert place == f"/{array}/1/foo/{key}/extensions/ACME"
+
+
 def test_extensions_among_many_properties_are_found() -> None:
     """Of thousands of objects with one of its own each, in linear time; and hundreds of levels deep."""
     nodes: list[Any] = [{"foo": {f"k{i}": i}} for i in range(20_000)]
