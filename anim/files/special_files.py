@@ -1,8 +1,10 @@
-"""Outputs that are written into instead of replaced: devices, named pipes, and what this process has open."""
+"""Devices, named pipes, and what this process has open: written into instead of replaced, or not read at all."""
 
 from __future__ import annotations
 
+import io
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -10,11 +12,27 @@ from typing import BinaryIO
 STANDARD_STREAMS = {"stdout": 1, "stderr": 2}  # in /dev
 DESCRIPTOR_FOLDERS = ("/dev/fd", "/proc/self/fd", "/proc/thread-self/fd")
 MAX_LINKS = 40  # that Linux follows
+NO_WAIT = getattr(os, "O_NONBLOCK", 0)  # a pipe opens at once; Windows has none
+BINARY = getattr(os, "O_BINARY", 0)  # on Windows alone
 
 
 def is_special(path: Path) -> bool:
     """Return whether a path is written directly: a device, a named pipe, or what this process has open."""
     return descriptor_of(path) is not None or (path.exists() and not path.is_file())
+
+
+def is_device_or_pipe(path: str | Path) -> bool:
+    """Return whether there is something at a path that is neither a file nor a folder: reading it may never end."""
+    return not os.path.isfile(path) and os.path.exists(path) and not os.path.isdir(path)
+
+
+def open_regular(path: str | Path) -> io.BufferedReader:
+    """Open a regular file for reading. Raises OSError for all others: a pipe is not waited for."""
+    file = os.fdopen(os.open(path, os.O_RDONLY | BINARY | NO_WAIT), "rb")
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError("is no regular file")
+    return file
 
 
 def open_special(path: Path) -> BinaryIO:

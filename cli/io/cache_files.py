@@ -26,6 +26,7 @@ from cli.errors import UsageError
 from cli.io import cache_folders, depfile, documents
 from cli.text import Reporter
 
+STDIN = "stdin"
 BVH = ".bvh"  # motion of joints, for other commands
 CommitWith: TypeAlias = Callable[[cache_folders.StagedFolder], AbstractContextManager[None]]
 
@@ -44,6 +45,11 @@ class LoadedCache:
     def size(self) -> int:
         """Bytes of all files opened so far."""
         return sum(self._folder.sizes.values())
+
+    @property
+    def files(self) -> list[Path]:
+        """Paths of all files opened so far, the main one first; none of stdin."""
+        return [] if self.name == STDIN else self._folder.paths
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +84,7 @@ def load(path: str, reading: ReadOptions, *, staged: cache_folders.StagedFolder 
     Its frames are read on demand, so use it inside the block; errors raised there name the input.
     staged: its files, if they are not yet renamed.
     """
-    name = "stdin" if path == documents.PIPE else path or "''"
+    name = STDIN if path == documents.PIPE else path or "''"
     notes: list[str] = []
     with ExitStack() as stack:
         try:
@@ -136,14 +142,15 @@ def save(
     ending: str,
     dry_run: bool = False,
     commit_with: CommitWith = commit_alone,
-    input: str = documents.PIPE,
+    inputs: Callable[[], Sequence[Sequence[Path]]] = lambda: (),
 ) -> SavedCache:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
     Companion files (a rest mesh) are left out on stdout, with a note.
     commit_with: makes other outputs of the written files, and replaces theirs after the cache's: an error of it leaves
     all files as they were. Not called for stdout.
-    input: the path of what the cache is made of, which is never replaced by a companion file: a UsageError.
+    inputs: gives the files of which the cache is made, once it is written: those of each input, its main file first.
+    Raises UsageError where a companion of the output would replace one of them.
     """
     is_pipe = path == documents.PIPE
     if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
@@ -162,7 +169,7 @@ def save(
                 cache_folders.to_stdout(staged)
             elif not is_pipe:
                 if CACHE_FORMATS[ending].files is not Files.FRAMES:
-                    _check_companions(staged, path, input)
+                    _check_companions(staged, path, inputs())
                 with commit_with(cache_folders.StagedFolder(staged)):
                     if not dry_run:
                         _commit(staged, path)
@@ -176,16 +183,23 @@ def save(
     return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)), orphans)
 
 
-def _check_companions(staged: AtomicOutputs, path: str, input: str) -> None:
-    """Raise UsageError if the input is replaced by a file beside the output, whose name nobody gave."""
-    if input == documents.PIPE:
-        return
-    real, folder = os.path.realpath(input), os.path.dirname(os.path.realpath(path))
-    for name in staged.names:
-        if name != staged.main and real == os.path.join(folder, name):
-            raise UsageError(
-                f"{input}: would be replaced by the file of this name beside {path}", help="choose another name for OUT"
-            )
+def _check_companions(staged: AtomicOutputs, path: str, inputs: Sequence[Sequence[Path]]) -> None:
+    """Raise UsageError if an input is replaced by a file beside the output, whose name nobody gave.
+
+    inputs: files that belong together, the main one first: one that is the output is replaced with its companions.
+    """
+    folder = os.path.dirname(os.path.realpath(path))
+    beside = {os.path.join(folder, name) for name in staged.names if name != staged.main}
+    for files in inputs:
+        if files and os.path.realpath(files[0]) == os.path.realpath(path):
+            continue
+        for each in files:
+            own = os.path.join(os.path.realpath(each.parent), each.name)  # a link is replaced itself
+            if not beside.isdisjoint((own, os.path.realpath(each))):
+                raise UsageError(
+                    f"{each}: would be replaced by the file of this name beside {path}",
+                    help="choose another name for OUT",
+                )
 
 
 def _commit(staged: AtomicOutputs, path: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import BinaryIO
@@ -20,6 +20,7 @@ from anim.errors import FormatError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
 from anim.files.special_files import descriptor_of
+from anim.memory import limit_for
 from cli.errors import UsageError
 from cli.io import depfile, documents
 
@@ -80,6 +81,11 @@ class CacheFolder:
         with self.open(name) as file:
             return file.read(SIGNATURE_BYTES), self.sizes[name]
 
+    @property
+    def paths(self) -> list[Path]:
+        """Paths of all files opened so far, the main one first."""
+        return [self._folder / name for name in sorted(self.sizes, key=lambda name: name != self.main)]
+
     def names(self) -> Sequence[str]:
         """Names of all files in the folder."""
         try:
@@ -122,7 +128,7 @@ def _received(stack: ExitStack) -> CacheFolder:
     path = Path(stack.enter_context(temporary_folder())) / "stdin"
     try:
         with path.open("wb") as file:
-            file.writelines(iter(_read_block, b""))
+            file.writelines(_blocks())
     except OSError as error:
         raise not_written("the temporary file for stdin", error).advise("TMPDIR names another folder for it") from None
     return CacheFolder(path.parent, path.name)
@@ -138,8 +144,8 @@ def _refuse_endless() -> None:
         raise FormatError("is a device (expected a file, or a pipe)")
 
 
-def _read_block() -> bytes:
+def _blocks() -> Iterator[bytes]:
     try:
-        return sys.stdin.buffer.read(COPY_BYTES)
+        yield from resolver.read_blocks(sys.stdin.buffer, limit_for(0), block=COPY_BYTES)
     except OSError as error:
         raise FormatError(f"stdin can't be read ({(error.strerror or str(error)).lower()})") from None

@@ -173,6 +173,11 @@ def commit_text_after(text: str | bytes, path: str) -> Iterator[None]:
             yield
 
 
+def input_files(source: Source) -> list[Path]:
+    """Return the paths of an input and of its buffers and images; none for stdin."""
+    return [] if source.folder is None else [Path(source.name), *external_files(source)]
+
+
 def check_output(path: str) -> None:
     """Raise UsageError if glTF can't be written to `path` or its extension is another format's.
 

@@ -51,9 +51,11 @@ def commit_cache_page_after(
     An error leaves the files as they were.
     """
     old, new = files
-    one, other = open_page_file(old, reporter), open_staged_file(new, staged, reporter)
+    again = Reporter(quiet=True)  # for the input, whose notes the command has reported
+    again.warnings = reporter.warnings
+    one, other = open_page_file(old, again), open_staged_file(new, staged, reporter)
     try:
-        with open_compared(old, reporter) as source:
+        with open_compared(old, again) as source:
             found = diff_opened(source, _compared(new, other, reporter), clip, FPS, reporter)
     except AnimError as error:
         reporter.info(f"note: {path}: without errors over time: {error}")

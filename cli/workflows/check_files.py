@@ -17,6 +17,7 @@ from anim.check.rules.invalid import RULE as INVALID
 from anim.check.rules.invalid import fault_occurrences
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError, FormatError, UnsupportedError
+from anim.files.special_files import is_device_or_pipe
 from cli import units
 from cli.errors import UsageError
 from cli.io import documents, input_files
@@ -197,5 +198,5 @@ class FileChecker:
 
 def _check_regular(source: str) -> None:
     """Raise FormatError for a source that is a pipe or device, which a check would wait for without an end."""
-    if os.path.exists(source) and not os.path.isfile(source) and not os.path.isdir(source):
+    if is_device_or_pipe(source):
         raise FormatError("is no regular file")

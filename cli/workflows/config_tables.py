@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import difflib
 import math
-import os
-import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from anim.errors import FormatError, UnsupportedError
+from anim.files.special_files import is_device_or_pipe, open_regular
 from cli.errors import UsageError
 from cli.tables import cut_middle
 
@@ -20,7 +19,6 @@ Keys: TypeAlias = Mapping[str, type | tuple[type, ...]]  # allowed keys, and the
 TYPE_NAMES = {str: "text", bool: "true or false", int: "a whole number", list: "a list", dict: "a table"}
 MAX_INTEGER = 2**63 - 1  # of TOML
 MAX_BYTES = 10_000_000  # of settings, which people write
-_NO_WAIT = getattr(os, "O_NONBLOCK", 0)  # for the writer of a pipe
 SECTIONS: Keys = {"check": dict, "budget": list, "recipe": list}
 
 
@@ -64,7 +62,7 @@ def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
 def _table(path: Path) -> dict[str, Any] | None:
     """The settings in a file, None if it has none."""
     try:
-        content = tomllib.loads(_read(path).decode("utf-8-sig").replace("\r\n", "\n"))
+        content = tomllib.loads(_read(path).decode("utf-8-sig"))
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -95,9 +93,9 @@ def _read(path: Path) -> bytes:
 
     Raises FileNotFoundError, OSError, FormatError, and UnsupportedError for more than MAX_BYTES.
     """
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | _NO_WAIT)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise FormatError("is no regular file", where=str(path))
+    if is_device_or_pipe(path):
+        raise FormatError("is no regular file", where=str(path))
+    with open_regular(path) as file:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise UnsupportedError(f"has more than {MAX_BYTES / 1e6:.0f} MB (settings are short)", where=str(path))

@@ -198,6 +198,29 @@ def test_links_are_written_through(call: Call, walk: Path, tmp_path: Path) -> No
     assert sorted(path.name for path in (tmp_path / "real").iterdir()) == ["new.glb", "out.glb"]
 
 
+def test_a_buffer_of_an_input_is_not_replaced_by_that_of_the_output(call: Call, tmp_path: Path) -> None:
+    """Which has the name that the buffer of another output had."""
+    call("bake", walk_of(tmp_path), tmp_path / "k.gltf", "--clip", "bend", "--fps", "5").product()
+    (tmp_path / "k.gltf").rename(tmp_path / "m.gltf")
+    before = contents(tmp_path)
+    run = call("bake", tmp_path / "m.gltf", tmp_path / "k.gltf", "--rigid", "--fps", "5")
+    assert f"{tmp_path / 'k.gltf.bin'}: would be replaced by the file of this name beside" in refusal(run, 2)
+    call("bake", tmp_path / "arm.glb", tmp_path / "c.npz", "--clip", "bend", "--fps", "5").product()
+    run = call("convert-cache", tmp_path / "c.npz", tmp_path / "k.gltf", "--onto", tmp_path / "m.gltf")
+    assert "k.gltf.bin: would be replaced" in refusal(run, 2)
+    assert {name: data for name, data in contents(tmp_path).items() if name != "c.npz"} == before
+    call("bake", tmp_path / "m.gltf", tmp_path / "m.gltf", "--rigid", "--fps", "5").product()  # in place
+
+
+def walk_of(folder: Path) -> Path:
+    (folder / "arm.glb").write_bytes(built("arm"))
+    return folder / "arm.glb"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in folder.iterdir()}
+
+
 def test_an_input_is_not_replaced_by_a_file_beside_the_output(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

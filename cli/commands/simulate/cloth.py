@@ -201,7 +201,7 @@ def command(
             caches.write_options(ending, given | {"max_error": meters}),
             ending=ending,
             dry_run=dry_run,
-            input=documents.PIPE if source.folder is None else source.name,
+            inputs=lambda: [documents.input_files(source)],
         )
     saved.report(reporter)
     name = "stdout" if output == documents.PIPE else output

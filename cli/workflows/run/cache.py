@@ -15,6 +15,7 @@ import numpy as np
 from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import OutputError
+from anim.files import special_files
 from cli.workflows.run import own_files
 from cli.workflows.run.stamps import Stamp, is_size, stamp_of
 from cli.workflows.run.steps import MAKING, Step
@@ -64,10 +65,10 @@ class FileHashes:
         known = self._known.get(path)
         if known is None or known[0] != stamp:
             try:
-                with own_files.open_regular(path) as file:
+                with special_files.open_regular(path) as file:
                     known = stamp, hashlib.file_digest(file, "sha256").hexdigest()
             except OSError:
-                return os.urandom(32).hex() if own_files.is_special(path) else ""
+                return os.urandom(32).hex() if special_files.is_device_or_pipe(path) else ""
             self._known[path] = known
         return known[1]
 

@@ -150,13 +150,13 @@ def _one_line(command: str) -> str:
 
 def _in_make(name: str) -> str:
     """A name as a target or prerequisite."""
-    _check_name(name, NOT_IN_MAKE, "make", "--emit ninja or shell")
+    _check_name(name, NOT_IN_MAKE, "make")
     return re.sub(r"([ #:])", r"\\\1", name).replace("$", "$$")
 
 
 def _in_ninja(name: str) -> str:
     """A name as an output or input of a build."""
-    _check_name(name, NOT_IN_NINJA, "ninja", "--emit shell")
+    _check_name(name, NOT_IN_NINJA, "ninja")
     return name.replace("$", "$$").replace(" ", "$ ").replace(":", "$:")
 
 
@@ -165,9 +165,10 @@ def _variable_in_ninja(variable: str, name: str) -> str:
     return f"./{variable}" if name.startswith("-") else variable
 
 
-def _check_name(name: str, refused: str, tool: str, help: str) -> None:
+def _check_name(name: str, refused: str, tool: str) -> None:
     found = next((c for c in name if c in refused), "")
     if found:
+        help = "--emit shell" if tool == "ninja" or any(c in NOT_IN_NINJA for c in name) else "--emit ninja or shell"
         raise UsageError(f"'{name}': {tool} has no names with {found!r}", help=help)
 
 

@@ -9,30 +9,15 @@ from pathlib import Path
 
 from anim.arrays import Bytes
 from anim.errors import OutputError
-from anim.files import atomic
+from anim.files import atomic, special_files
 
-NO_WAIT = getattr(os, "O_NONBLOCK", 0)  # a pipe opens at once, to be refused
-NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # Windows has neither
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # Windows has none
 HELP = "delete it, or name another folder with --cache"
-
-
-def open_regular(path: str | Path) -> io.BufferedReader:
-    """Open a regular file for reading. Raises OSError for all others: a device or pipe may never end."""
-    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | NO_WAIT))  # noqa: SIM115
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-        file.close()
-        raise OSError("is no regular file")
-    return file
-
-
-def is_special(path: str | Path) -> bool:
-    """Return whether a path is that of a device, pipe or socket."""
-    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
 def read(path: Path) -> bytes:
     """Return the bytes of a regular file. Raises OSError for all others."""
-    with open_regular(path) as file:
+    with special_files.open_regular(path) as file:
         return file.read()
 
 
@@ -41,7 +26,7 @@ def write(folder: Path, path: Path, data: Bytes) -> None:
     check_links(folder, path)
     with atomic.name_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        if is_special(path):
+        if special_files.is_device_or_pipe(path):
             path.unlink()
     atomic.write_file(path, [data])
 
@@ -49,7 +34,7 @@ def write(folder: Path, path: Path, data: Bytes) -> None:
 def open_for_lines(path: Path, *, append: bool) -> io.FileIO:
     """Open a file of a cache's folder for writing, unbuffered: closing it writes nothing. Raises OutputError."""
     check_links(path.parent, path)
-    flags = os.O_WRONLY | os.O_CREAT | NO_LINK | NO_WAIT | (os.O_APPEND if append else 0)
+    flags = os.O_WRONLY | os.O_CREAT | NO_LINK | special_files.NO_WAIT | (os.O_APPEND if append else 0)
     with atomic.name_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         file = io.FileIO(path, "w", opener=lambda name, _: os.open(name, flags | getattr(os, "O_CLOEXEC", 0), 0o666))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import posixpath
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from anim.errors import FormatError, OutputError
+from anim.files.special_files import is_device_or_pipe
 
 RealPath: TypeAlias = Callable[[str], str]  # a path without links
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:  # which imports this module
     from cli.workflows.run.job import Job
 
 
-def clashes(jobs: Sequence[Job]) -> Iterator[str]:
+def find_clashes(jobs: Sequence[Job]) -> Iterator[str]:
     """Yield the problems of outputs that links lead elsewhere: to an input, to another output, or out of the folder.
 
     Names alone don't show it: with a link `build` to ".", "build/a.glb" is "a.glb". A file of another job's steps may
@@ -25,9 +27,7 @@ def clashes(jobs: Sequence[Job]) -> Iterator[str]:
     real_of = _real_paths()
     outputs = {job.output for job in jobs}
     names = dict.fromkeys((job.folder, name) for job in jobs for name in _inputs(job))  # in order, for messages
-    read = {
-        real_of(os.path.join(folder, name)): name for folder, name in names if os.path.normpath(name) not in outputs
-    }
+    read = {real_of(os.path.join(folder, name)): name for folder, name in names if _as_output(name) not in outputs}
     made = dict[str, str]()
     for job in jobs:
         real = real_of(os.path.join(job.folder, job.output))
@@ -48,13 +48,13 @@ def check_output(job: Job) -> None:
 def check_regular(folder: Path, names: Iterable[str]) -> None:
     """Raise FormatError for a pipe or device among the inputs: one that never ends would be read for its hash."""
     for name in names:
-        if is_special(folder / name):
+        if is_device_or_pipe(folder / name):
             raise FormatError("is no regular file", where=name)
 
 
-def is_special(path: str | Path) -> bool:
-    """Return whether there is something at a path that is neither a file nor a folder: a pipe or a device."""
-    return not os.path.isfile(path) and os.path.exists(path) and not os.path.isdir(path)
+def _as_output(name: str) -> str:
+    """A name as outputs are written: with "/", and no dots."""
+    return posixpath.normpath(name.replace(os.sep, "/"))
 
 
 def _inputs(job: Job) -> Iterator[str]:
@@ -72,7 +72,7 @@ def _problem(job: Job, real_of: RealPath) -> str:
         return f"'{job.output}', the output of '{job.input}', is a file that its own steps read"
     if not real.startswith(os.path.join(real_of(str(job.folder)), "")):
         return f"'{job.output}' leads out of the folder of the settings, by a link"
-    return f"'{job.output}' is no regular file" if is_special(real) else ""
+    return f"'{job.output}' is no regular file" if is_device_or_pipe(real) else ""
 
 
 def _real_paths() -> RealPath:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 from anim.errors import NotFoundError
+from anim.files.special_files import is_device_or_pipe
 from anim.gltf.io import container
 from cli.errors import UsageError
 from cli.io import input_files
@@ -60,8 +61,8 @@ def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
             raise UsageError(f"{path}: matches no recipe of {book.path}", help="--recipe NAME chooses one for any file")
     if not jobs:
         raise NotFoundError(f"{book.path}: no recipe matches a file")
-    for problem in places.clashes(jobs):
-        raise UsageError(f"{book.path}: {problem}", help="out names files in a folder of their own")
+    if problem := next(places.find_clashes(jobs), ""):
+        raise UsageError(f"{book.path}: {problem}", help="out names other files, in the folder of the settings")
     places.check_regular(book.folder, used | {name for job in jobs for step in job.steps for name in step.files})
 
 
@@ -83,7 +84,7 @@ def _files(book: RecipeBook, recipe: Recipe) -> Iterator[str]:
         for name in sorted(names):
             if name.startswith(".") or (is_gltf and not name.lower().endswith(container.SUFFIXES)):
                 continue
-            if not places.is_special(os.path.join(folder, name)):  # as `check` leaves pipes and devices out
+            if not is_device_or_pipe(os.path.join(folder, name)):  # as `check` leaves pipes and devices out
                 yield prefix + name
 
 
