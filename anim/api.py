@@ -27,7 +27,7 @@ from anim.measure.compare import diff as compare
 from anim.measure.compare.diff import Diff
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import FPS
-from anim.measure.error.surface import diagonal
+from anim.measure.error.surface import diagonal, reference_length
 from anim.model import Clip
 from anim.operations.selection import Selection, match_names
 from anim.optimization.byte_limit import ByteLimit
@@ -40,7 +40,7 @@ from anim.sampling.times import frame_times
 from anim.skinning import bake as skinning
 
 ClipKey: TypeAlias = Clip | str | int
-SHELL_PER_DIAGONAL = "1%"  # of the diagonal: radius of the sample points around nodes without vertices
+SHELL = "1%"  # of the reference length: radius of the sample points around nodes without vertices
 MAX_POINTER_ERROR = 1e-4  # of the range of a pointer track
 
 
@@ -102,7 +102,7 @@ def optimize(
     usual = DEFAULT_MAX_ERROR if max_error is None else max_error
     limits = Bounds(
         length(usual, "max_error"),
-        length(SHELL_PER_DIAGONAL, "shell"),
+        meters(SHELL, "shell", lambda: reference_length(scale)),
         MAX_POINTER_ERROR,
         None if max_angle is None else radians(max_angle, "max_angle"),
         None if max_speed_error is None else length(max_speed_error, "max_speed_error"),

@@ -153,8 +153,7 @@ class ClipOptimizer:
 
     @cached_property
     def _ruler(self) -> ErrorMetric:
-        fraction = self.request.bounds.shell / (self._diagonal or 1.0)
-        shell = None if self.request.policy.drop_invisible else fraction
+        shell = None if self.request.policy.drop_invisible else self.request.bounds.shell
         scene = (self if self._whole is None else self._whole).before
         whole = WholeScene.of(scene, self._diagonal)
         return ErrorMetric(self.before, self.after, shell=shell, clips=self.clips, whole=whole)

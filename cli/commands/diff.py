@@ -16,7 +16,7 @@ from anim.measure.compare.diff import diff as compared
 from anim.measure.compare.equal_scenes import store_alike
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import FPS
-from anim.measure.error.surface import diagonal, is_measured_at
+from anim.measure.error.surface import diagonal, is_measured_at, reference_length
 from anim.operations.selection import Selection
 from anim.sampling.players import PLAYERS, parse_pair
 from anim.units import is_zero
@@ -143,9 +143,8 @@ def command(
     assert other is not None
     scale = diagonal(one.scene)
     limit = None if fail_above is None else _length(fail_above, "--fail-above", scale)
-    radius = _length(shell, "--shell", scale)
-    fraction = radius / scale if radius and scale else None
-    ruler = ErrorMetric(one.scene, other.scene, shell=fraction, clips=(*one.clips, *other.clips))
+    radius = _length(shell, "--shell", reference_length(scale))
+    ruler = ErrorMetric(one.scene, other.scene, shell=radius or None, clips=(*one.clips, *other.clips))
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     try:
         found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)

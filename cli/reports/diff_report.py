@@ -125,7 +125,7 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
         str(error.vertex) if error.vertex >= 0 else "",
         f"{error.time:.3f}" if moved else "",
         format_length(error.max_error),
-        _share(_percent(error.max_error, diagonal)) if moved else "",
+        _share(_percent(error.max_error, diagonal)) if moved and diagonal else "",
         format_length(found.p99) if moved else "",
         format_length(found.mean) if moved else "",
         f"{_share(math.degrees(found.angle.size))}°" if found.angle.size else "",

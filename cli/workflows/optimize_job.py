@@ -12,7 +12,7 @@ from anim.files import signals
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.measure.error.surface import diagonal
+from anim.measure.error.surface import diagonal, reference_length
 from anim.model import Scene
 from anim.operations.selection import Selection
 from anim.optimization.byte_limit import ByteLimit, ByteLimitError
@@ -110,7 +110,8 @@ def bounds(scene: Scene, said: Mapping[str, str | None]) -> Bounds:
         text, option = said[name], f"--{name.replace('_', '-')}"
         if text is None:
             return None
-        return 0.0 if is_zero(text) else units.parse_length(text, option, lambda: scale)
+        whole = reference_length(scale) if name == "shell" else scale
+        return 0.0 if is_zero(text) else units.parse_length(text, option, lambda: whole)
 
     pointer, angle, speed = said["max_pointer_error"] or "0", said["max_angle"], said["max_speed_error"]
     return Bounds(

@@ -86,8 +86,8 @@ class ErrorMetric:
     other: the scene of the second clip: with another rest pose, other node indices, another file. The first scene's
     surface is moved by both scenes, so that only motion counts (`anim.measure.compare.correspondence`).
     combined: the parts without morph targets as one, then the others.
-    shell: as a fraction of the diagonal, the distance of six points around each node that moves no vertex; None ignores
-    such nodes, except in a scene without vertices: that is measured at cubes on its nodes.
+    shell: m, the distance of six points around each node that moves no vertex; None ignores such nodes, except in a
+    scene without vertices: that is measured at cubes on its nodes.
     clips: all that will be measured, if known: then nodes of large scenes that none of them moves cost nothing.
     whole: what `scene` is a part of; its other nodes don't move.
     num_static_points: number of vertices of rigid meshes, or of points of shells if there are none, on nodes that no

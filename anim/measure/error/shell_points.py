@@ -84,11 +84,11 @@ def points_around_nodes(
     """Return the nodes (S,) that are measured at points (S, P, 3) around them, in their spaces.
 
     On shells those without vertices; on cubes all of a scene without any surface. partners: (N,) of nodes in the other
-    scene, −1 without one. shell: as a fraction of the diagonal in m, None for no shells.
+    scene, −1 without one. shell: m, None for no shells. diagonal: m, of the scene.
     """
     if shell is not None:
         nodes = np.flatnonzero(nodes_without_vertices(scene.skeleton, surfaces) & (partners >= 0))
-        return nodes, shell_points(scene.skeleton, nodes, shell * diagonal)
+        return nodes, shell_points(scene.skeleton, nodes, shell)
     if surfaces:
         return np.empty(0, np.int64), np.empty((0, NUM_CORNERS, 3))
     return np.arange(len(scene.skeleton)), node_cubes(scene, diagonal)

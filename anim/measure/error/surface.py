@@ -13,7 +13,8 @@ from anim.maths import matrix
 from anim.model import MeshInstance, Scene
 from anim.sampling import rest_world
 
-SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's diagonal
+SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's reference length
+MIN_EXTENT = 1e-6  # m; a smaller diagonal says nothing about the size of what is seen from, or hangs on, its nodes
 
 NUM_CORNERS = 8  # of such a cube
 MERGED_POINTS = 1 << 15  # of surfaces that become one: more than costs a few calls of numpy, less than takes memory
@@ -66,8 +67,16 @@ def node_cubes(scene: Scene, diagonal: float) -> Floats:
     diagonal: m, of the scene. All are the same: a view of one cube.
     """
     sides = (-1.0, 1.0)
-    cube = SHELL * diagonal * np.array([[x, y, z] for x in sides for y in sides for z in sides])
+    cube = SHELL * reference_length(diagonal) * np.array([[x, y, z] for x in sides for y in sides for z in sides])
     return np.broadcast_to(cube, (len(scene.skeleton), *cube.shape))
+
+
+def reference_length(diagonal: float) -> float:
+    """Return the length, m, whose fractions are distances around nodes that move no vertex.
+
+    It is the scene's diagonal; a metre if that is 0, as of a single camera: its rotation is an error too.
+    """
+    return diagonal if diagonal > MIN_EXTENT else 1.0
 
 
 def diagonal(scene: Scene) -> float:
