@@ -13,19 +13,22 @@ from anim.optimization.file_optimizer import FAST, FileOptimizer
 from anim.optimization.optimize import Optimized, estimate_sizes, is_output_of
 from anim.optimization.options import Request
 from anim.optimization.rate_distortion import (
+    BOUND_STEP_FACTOR,
     MAX_BOUND_PER_DIAGONAL,
+    MAX_STEP_FACTOR,
     RatePoint,
-    bound_below,
     bound_between,
-    bound_for,
     check_diagonal,
+    is_smaller,
     next_bound,
-    size_at,
+    round_bound,
     smallest_bound,
 )
 
 USUAL_RATIO = 0.955  # bytes of animation after a longer search, as a fraction of those after a fast one
-SAMPLE_UNCERTAINTY = 0.025  # fraction by which the bytes of all clips differ from those expected after a sample
+EXPECTED_WEIGHT = 40  # clips whose sizes tell as much as the fast searches: a sample of 13 was 5-9 % too small
+SIZE_MARGIN = 0.005  # of the animation's bytes, left free by groups: too many bytes cost another search of some clips
+SAMPLE_UNCERTAINTY = 0.006  # fraction by which the bytes of all clips differ from those expected after a sample
 MAX_RAISE_FACTOR = 1.25  # between bounds of groups of clips: where more is needed, some of those before are repaired
 MAX_REPAIRS = 6  # searches of some clips at a larger bound, until a result fits; the last two are of all clips
 REPAIR_FRACTION = 0.005  # of the animation's bytes, that a larger bound would save beyond the need: few clips need it
@@ -76,6 +79,7 @@ class ByteLimit:
         self._max_bytes = max_bytes
         self._request = request
         self._fast = FastSizes(file, request)
+        self._usual_ratio = 1.0 if request.effort == FAST else USUAL_RATIO
         self._most = MAX_BOUND_PER_DIAGONAL * file.scale if ceiling is None else ceiling
         # In the place of the bound: output of the same limit comes back unchanged.
         self._name = ("max_bytes", str(max_bytes), str(ceiling is None), *(request.given or (repr(request.bounds),)))
@@ -86,8 +90,7 @@ class ByteLimit:
         file, named = self._file, replace(self._request, given=self._name)
         if is_output_of(file.document, file.clips, named, file.chosen):
             return named, Optimized(file.document, {}, {}, unchanged=True)
-        ratio = 1.0 if self._request.effort == FAST else USUAL_RATIO
-        bound = smallest_bound(self._max_bytes, file.scale, self._fast.measure, ratio=ratio)
+        bound = smallest_bound(self._max_bytes, file.scale, self._fast.measure, ratio=self._usual_ratio)
         found = self._find_fitting(self._most if bound is None else min(bound, self._most))
         best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
         if best is None:
@@ -125,8 +128,7 @@ class ByteLimit:
             failed = max((each.tried for each in found if not self._fits(each)), default=0.0)
             if self._fits(found[-1]):
                 best = point
-                low = max(bound_below(best, self._max_bytes, self._fast.exponent(best.max_error)), failed)
-                between = bound_between(low, best.max_error, self._file.scale)
+                between = self._smaller_bound(best, failed)
                 if between is None or self._max_bytes - best.size <= MAX_UNUSED_FRACTION * best.animation:
                     break
                 self._search([i for i, each in self._clips.items() if each.bound > between], between)
@@ -137,6 +139,19 @@ class ByteLimit:
                 self._repair(point, min(self._repair_bound(point), between))
             found.append(self._write())
         return found
+
+    def _smaller_bound(self, best: RatePoint, failed: float) -> float | None:
+        """A bound, m, that is likely to use the bytes that the best result leaves; None if it is too near.
+
+        failed: m, the largest bound whose result was too large, or 0.
+        """
+        excess = best.animation / max(best.animation + self._max_bytes - best.size, 1)
+        if not self._file.scale or not best.max_error:
+            return None
+        likely = self._fast.curve().bound_for(excess, best.max_error, self._file.scale)
+        if likely <= failed:
+            return bound_between(failed, best.max_error, self._file.scale)
+        return likely if is_smaller(likely, best.max_error) else None
 
     def _find_fast(self, bound: float) -> list[_Result]:
         """The result of a fast search, which by chance can take fewer bytes; none if it is not likely to fit."""
@@ -177,45 +192,61 @@ class ByteLimit:
         uncertainty: fraction of the expected bytes by which they may differ.
         """
         point, fast = self._fast.first
-        exponent, chosen = self._fast.exponent(bound), set(some)
+        chosen = set(some)
         other = point.size - sum(fast.values())  # bytes of the file apart from clips
         used = sum(each.size for i, each in self._clips.items() if i not in chosen)
-        here = sum(size_at(each.size, each.bound, bound, exponent) for each in self._clips.values())
-        ratio = here / max(sum(fast[i] for i in self._clips), 1.0)
-        excess = max(ratio * sum(fast[i] for i in some), 1.0) / max(self._max_bytes - other - used, 1.0)
+        left = self._max_bytes - SIZE_MARGIN * point.animation - other - used
+        excess = max(self._ratio(bound) * sum(fast[i] for i in some), 1.0) / max(left, 1.0)
         if not self._file.scale or abs(math.log(excess)) <= uncertainty:
             return bound
         excess *= math.exp(math.copysign(uncertainty, -math.log(excess)))
-        return bound_for(excess, bound, self._file.scale, exponent)
+        return self._fast.curve().bound_for(excess, bound, self._file.scale)
+
+    def _ratio(self, bound: float) -> float:
+        """Bytes of clips at a bound, m, as a fraction of the first fast search's: expected, and as found so far."""
+        curve, fast = self._fast.curve(), self._fast.first[1]
+        found = sum(curve.size_at(each.size, each.bound, bound) for each in self._clips.values())
+        found /= max(sum(fast[i] for i in self._clips), 1.0)
+        expected = curve.size_at(self._usual_ratio, self._fast.first[0].max_error, bound)
+        weight = len(self._clips) / (len(self._clips) + EXPECTED_WEIGHT)
+        return float(max(found, 1e-9) ** weight * expected ** (1 - weight))
 
     def _repair(self, point: RatePoint, bound: float) -> None:
         """Search as many clips again, at a larger bound, as are likely to save the bytes too many."""
-        clips = self._clips
-        few = len(clips) < MIN_SAMPLED or not point.max_error
+        few = len(self._clips) < MIN_SAMPLED or not point.max_error
         needed = math.inf if few else REPAIR_MARGIN * (point.size - self._max_bytes)
-        exponent = self._fast.exponent(bound)
         saved, chosen = 0.0, []
-        for i in sorted(clips, key=lambda i: clips[i].tried):  # small bounds save most
+        for i, bytes_saved in self._savings(bound).items():
             if saved >= needed:
                 break
-            saved += clips[i].size - size_at(clips[i].size, max(clips[i].tried, clips[i].bound), bound, exponent)
+            saved += bytes_saved
             chosen.append(i)
         self._search(chosen, bound)
 
     def _repair_bound(self, point: RatePoint, step: float = 1.0) -> float:
         """A bound, m, that is likely to save the bytes too many, and some more: then not all clips need it.
 
-        step: factor on the logarithm of the distance from the largest bound that was searched.
+        step: factor on the bytes more, or of few clips on the logarithm of the distance from their bound.
         """
-        tried = max(each.tried for each in self._clips.values())
+        tried = [each.tried for each in self._clips.values()]
         if not self._file.scale:
             return self._most
-        if len(self._clips) < MIN_SAMPLED or not tried:
-            bound = next_bound(tried, self._file.scale, point, self._max_bytes)
-        else:
-            saved = (point.size - self._max_bytes) / max(point.animation, 1) + REPAIR_FRACTION
-            bound = bound_for(1 / max(1 - saved, 0.1), tried, self._file.scale, self._fast.exponent(tried))
-        return min(bound * (bound / tried) ** (step - 1) if tried else bound, self._most)
+        if len(tried) < MIN_SAMPLED or not min(tried):
+            low = max(tried)
+            bound = next_bound(low, self._file.scale, point, self._max_bytes)
+            return min(bound * (bound / low) ** (step - 1) if low else bound, self._most)
+        bound = min(tried) * BOUND_STEP_FACTOR
+        needed = point.size - self._max_bytes + step * REPAIR_FRACTION * point.animation
+        while bound < MAX_STEP_FACTOR * max(tried) and sum(self._savings(bound).values()) < needed:
+            bound *= BOUND_STEP_FACTOR
+        return min(round_bound(bound, self._file.scale), self._most)
+
+    def _savings(self, bound: float) -> dict[int, float]:
+        """The bytes that clips are likely to save at a larger bound, m, than their last one: most come first."""
+        curve = self._fast.curve()
+        smaller = sorted((each.tried, i) for i, each in self._clips.items() if each.tried < bound)
+        sizes = {i: self._clips[i].size for _, i in smaller}
+        return {i: sizes[i] - curve.size_at(sizes[i], tried, bound) for tried, i in smaller}
 
     def _search(self, chosen: Sequence[int], bound: float) -> None:
         """Search some clips at a bound, m; a result that is in place and as good within it stays."""

@@ -11,7 +11,8 @@ from anim.optimization.clip_optimizer import ClipResult
 from anim.optimization.file_optimizer import FAST, FileOptimizer
 from anim.optimization.optimize import estimate_sizes
 from anim.optimization.options import Request
-from anim.optimization.rate_distortion import FIRST_FRACTION, RatePoint, local_exponent
+from anim.optimization.rate_curve import RateCurve
+from anim.optimization.rate_distortion import FIRST_FRACTION, RatePoint
 
 SAMPLE_STEP = 6  # one clip of so many measures sizes at other bounds than the first
 MIN_SAMPLED = 12  # different clips of a file; of fewer all are measured
@@ -50,9 +51,9 @@ class FastSizes:
         fitting = (bound for bound, point in self._tried.items() if bound > above and point.size <= max_bytes)
         return min(fitting, default=above)
 
-    def exponent(self, bound: float) -> float:
-        """Return the exponent n around a bound, m, where bytes of animation are as bound^(-1/n)."""
-        return local_exponent(bound, list(self._tried.values()))
+    def curve(self) -> RateCurve:
+        """Return the curve of bytes against the bound through all points that were measured so far."""
+        return RateCurve(list(self._tried.values()))
 
     def expand(self, results: Mapping[int, ClipResult]) -> dict[int, ClipResult]:
         """Return the results of all clips from those that differ."""

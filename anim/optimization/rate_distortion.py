@@ -77,33 +77,9 @@ def smallest_bound(
     for each in range(entry, len(TABLE_FRACTIONS)):
         bound = table.bound_before(each, max_bytes, ratio)
         if bound is not None:
-            return min(_rounded(bound, diagonal), table.bound(each))
+            return min(round_bound(bound, diagonal), table.bound(each))
     last = len(TABLE_FRACTIONS) - 1
     return table.bound(last) if table.size(last, 1.0) <= max_bytes else None
-
-
-def local_exponent(bound: float, points: Sequence[RatePoint]) -> float:
-    """Return the exponent n around a bound, m, where animation bytes are as bound^(-1/n) between the nearest points."""
-    low = max((each for each in points if 0 < each.max_error <= bound), key=lambda each: each.max_error, default=None)
-    high = min((each for each in points if each.max_error > bound), key=lambda each: each.max_error, default=None)
-    if low is None or high is None or low.animation <= high.animation:
-        return BOUND_EXPONENT_PER_SIZE
-    found = math.log(high.max_error / low.max_error) / math.log(low.animation / max(high.animation, 1))
-    return min(max(found, BOUND_EXPONENT_PER_SIZE / 4), 2 * BOUND_EXPONENT_PER_SIZE)
-
-
-def bound_for(excess: float, bound: float, diagonal: float, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
-    """Return the likely bound, m, of a result that fits, after one that takes `excess` times the bytes available."""
-    factor = excess**exponent
-    return _rounded(bound * min(max(factor, 1 / MAX_STEP_FACTOR), MAX_STEP_FACTOR), diagonal)
-
-
-def size_at(size: float, bound: float, other: float, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
-    """Return the likely size, in bytes, at another bound above 0, of a result of `size` bytes at a bound.
-
-    It stays the same from a bound of 0.
-    """
-    return float(size * (bound / other) ** (1 / exponent)) if bound else size
 
 
 def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) -> float:
@@ -111,23 +87,18 @@ def next_bound(bound: float, diagonal: float, point: RatePoint, max_bytes: int) 
     animation = max(point.animation - (point.size - max_bytes), 1)
     excess = min(point.animation / animation, 2.0)
     factor = min(max(excess**BOUND_EXPONENT_PER_SIZE, BOUND_STEP_FACTOR), MAX_STEP_FACTOR)
-    return _rounded(max(bound, MIN_BOUND_PER_DIAGONAL * diagonal) * factor, diagonal)
-
-
-def bound_below(point: RatePoint, max_bytes: int, exponent: float = BOUND_EXPONENT_PER_SIZE) -> float:
-    """Return a bound, m, that is likely too small, where a result leaves bytes unused.
-
-    Its geometric mean with the result's own bound is the one that is likely to use them all.
-    """
-    excess = min(1 + (max_bytes - point.size) / max(point.animation, 1), 2.0)
-    factor = min(max(excess ** (2 * exponent), TABLE_FACTOR), MAX_STEP_FACTOR**2)
-    return float(point.max_error / factor)
+    return round_bound(max(bound, MIN_BOUND_PER_DIAGONAL * diagonal) * factor, diagonal)
 
 
 def bound_between(low: float, high: float, diagonal: float) -> float | None:
     """Return a bound, m, between two of which the lower one is taken for too small; None if they are too near."""
-    middle = _rounded(math.sqrt(low * high), diagonal) if low and diagonal else high
-    return middle if middle < high / math.sqrt(BOUND_STEP_FACTOR) else None
+    middle = round_bound(math.sqrt(low * high), diagonal) if low and diagonal else high
+    return middle if is_smaller(middle, high) else None
+
+
+def is_smaller(bound: float, other: float) -> bool:
+    """Return whether a bound, m, is smaller than another by so much that a search may save bytes."""
+    return bound < other / math.sqrt(BOUND_STEP_FACTOR)
 
 
 class _SizeTable:
@@ -208,8 +179,8 @@ def _first_entry(fits: Callable[[int, int], bool]) -> int:
     return high
 
 
-def _rounded(bound: float, diagonal: float) -> float:
-    """The bound, m, rounded up to one of few: near byte limits then give the same result."""
+def round_bound(bound: float, diagonal: float) -> float:
+    """Return the bound, m, rounded up to one of few: near byte limits then give the same result."""
     step = math.log(BOUND_STEP_FACTOR)
     largest = MAX_BOUND_PER_DIAGONAL * diagonal
     return min(diagonal * math.exp(step * math.ceil(math.log(bound / diagonal) / step - 1e-9)), largest)

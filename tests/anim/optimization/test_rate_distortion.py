@@ -10,20 +10,14 @@ from dataclasses import replace
 import pytest
 
 from anim.optimization.rate_distortion import (
-    BOUND_EXPONENT_PER_SIZE,
-    BOUND_STEP_FACTOR,
     ERROR_FRACTIONS,
     FIRST_FRACTION,
     MAX_BOUND_PER_DIAGONAL,
-    MAX_STEP_FACTOR,
     MIN_BOUND_PER_DIAGONAL,
     RatePoint,
     bound_between,
-    bound_for,
     curve,
-    local_exponent,
     next_bound,
-    size_at,
     smallest_bound,
 )
 
@@ -146,16 +140,3 @@ def test_bounds_between_two_come_to_an_end() -> None:
         high, tried = bound, tried + 1
     assert 2 <= tried <= 5
     assert bound_between(0.0, high, DIAGONAL) is None
-
-
-def test_sizes_and_bounds_follow_the_local_exponent() -> None:
-    """Bytes as bound^(-1/8) between the points; without points on both sides the usual exponent."""
-    points = [RatePoint(bound, 0, bound, round(1e6 * bound ** (-1 / 8))) for bound in (1e-4, 1e-3, 1e-2)]
-    exponent = local_exponent(3e-4, points)
-    assert exponent == pytest.approx(8, rel=1e-3)
-    assert local_exponent(1.0, points) == local_exponent(1e-5, points) == BOUND_EXPONENT_PER_SIZE
-    assert size_at(1000, 1e-3, 2e-3, 8) == pytest.approx(1000 * 2 ** (-1 / 8))
-    assert size_at(1000, 0.0, 2e-3, 8) == 1000
-    bound = bound_for(1.02, 1e-3, DIAGONAL, 8)
-    assert 1e-3 * 1.02**8 <= bound <= 1e-3 * 1.02**8 * BOUND_STEP_FACTOR
-    assert bound_for(100, 1e-3, DIAGONAL, 8) <= 1e-3 * MAX_STEP_FACTOR * BOUND_STEP_FACTOR
