@@ -10,6 +10,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.sample_times import dense_times
+from anim.measure.error.surface import diagonal
 from anim.optimization.optimize import Optimized, optimize
 from anim.optimization.options import Bounds, Request
 from anim.sampling.players import PLAYERS
@@ -19,8 +20,8 @@ EVERY = tuple(PLAYERS)
 
 
 def request_for(document: Document, share: float, **more: Any) -> Request:
-    diagonal = ErrorMetric(reader.scene(document)).diagonal
-    bounds = replace(more.pop("bounds", Bounds(0.0, 0.0)), max_error=share * diagonal, shell=0.01 * diagonal)
+    size = diagonal(reader.scene(document))
+    bounds = replace(more.pop("bounds", Bounds(0.0, 0.0)), max_error=share * size, shell=0.01 * size)
     return Request(bounds, **{"effort": "fast", **more})
 
 
@@ -33,7 +34,8 @@ def optimized(document: Document, request: Request, **more: Any) -> tuple[Optimi
 def error(before: Document, after: Document, players: Sequence[str] = EVERY) -> float:
     """The largest distance in any clip for any player, as a share of the diagonal; all clips must be there."""
     old, new = reader.clips(before), reader.clips(after)
-    ruler = ErrorMetric(reader.scene(before), reader.scene(after), shell=0.01)
+    scene = reader.scene(before)
+    ruler = ErrorMetric(scene, reader.scene(after), shell=0.01 * diagonal(scene))
     worst = 0.0
     assert [each.name for each in new] == [each.name for each in old]
     for a, b in zip(old, new, strict=True):
