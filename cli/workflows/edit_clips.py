@@ -30,6 +30,7 @@ from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
 from cli.reports.rotation_notes import describe_non_unit_keys
+from cli.reports.size_notes import growth_note
 from cli.text import DRY, format_span, format_time
 
 Clips = Mapping[int, Clip]  # by index in the file
@@ -150,6 +151,8 @@ def edit_together(
         before = text.format_bytes(size) if size == source.size else text.format_change(source.size, size)
         reporter.info(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
+    if words := growth_note(edited.before, edited.after, size_ratio=size / source.size):
+        reporter.info(f"note: {words}")
     reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
