@@ -14,7 +14,7 @@ import typer
 from cli import main
 from cli.command_table import COMMANDS
 from cli.workflows.run.steps import EDITING, MAKING, REFUSED
-from tests.cli.conftest import Call
+from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, help_line, refusal
 from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, write_recipe
 
@@ -30,6 +30,28 @@ def test_the_output_is_that_of_single_commands(folder: Path, call: Call) -> None
         made = call("resample", f"crowd/{name}.glb", "--fps", "30").product()
         made = call(*STEPS[1].split(), stdin=made).product()
         assert (folder / "build" / "crowd" / f"{name}.glb").read_bytes() == made
+
+
+@pytest.mark.parametrize("step", ["resample --fps 12", "convert", "convert --embed", "optimize --effort fast"])
+def test_a_text_is_that_of_a_single_command(step: str, folder: Path, call: Call, fixture: Fixture) -> None:
+    """The product of a step is a GLB, in which a buffer is no data URI and the text has no indent."""
+    (folder / "single").mkdir()
+    for name in ("gltf_embedded", "gltf_external"):
+        fixture(name)
+        command, *options = step.split()
+        call(command, f"{name}.gltf", f"single/{name}.gltf", *options).product()
+    write_recipe(folder, step, match="*.gltf", out="build/{name}")
+    for state in ("made", "cached"):
+        assert f"2 {state}" in call("run").err
+        expected = {path.name: path.read_bytes() for path in (folder / "single").iterdir()}
+        assert {path.name: path.read_bytes() for path in (folder / "build").iterdir()} == expected
+        shutil.rmtree(folder / "build")
+
+
+def test_a_last_step_embeds_buffers_of_a_text(folder: Path, call: Call) -> None:
+    write_recipe(folder, *PLAIN, "convert --embed", out="build/{stem}.gltf")
+    call("run").product()
+    assert [path.name for path in (folder / "build").iterdir()] == ["arm 1.gltf"]
 
 
 def test_a_second_run_makes_nothing(folder: Path, call: Call) -> None:
