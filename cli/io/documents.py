@@ -186,12 +186,14 @@ def input_files(source: Source) -> list[Path]:
     return [] if source.folder is None else [Path(source.name), *external_files(source)]
 
 
-def check_output(path: str) -> None:
-    """Raise UsageError if glTF can't be written to `path` or its extension is another format's.
+def check_output(path: str, *, dry_run: bool = False) -> None:
+    """Raise UsageError or OutputError if glTF can't be written to `path` or its extension is another format's.
 
     A name without extension is a GLB; devices and named pipes (/dev/null) can have any name.
+    dry_run: a file must be possible all the same; stdout gets nothing.
     """
-    check_binary(path)
+    if path != PIPE or not dry_run:
+        check_binary(path)
     check_extension(path)
 
 
@@ -234,7 +236,7 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
         if path.endswith(("/", os.sep)):
             raise UsageError(f"{path}: there is no such folder (expected a file name)")
         if not target.parent.is_dir():
-            raise UsageError(f"{path}: there is no folder '{target.parent}'")
+            raise OutputError(f"{path}: there is no folder '{target.parent}'")
         if target.is_file() or not target.exists():
             from anim.files import atomic
 

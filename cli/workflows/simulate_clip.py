@@ -46,9 +46,10 @@ def simulate_clip(
     others: file extensions of other formats. uses: glTF extensions that only this simulation supports.
     """
     began = time.perf_counter()
-    if not dry_run:
-        is_other = output != documents.PIPE and PurePath(output).suffix.lower() in others
-        (documents.check_file if is_other else documents.check_output)(output)
+    if output != documents.PIPE and PurePath(output).suffix.lower() in others:
+        documents.check_file(output)
+    else:
+        documents.check_output(output, dry_run=dry_run)
     check_report(report)
     with documents.source(input, reporter, uses=uses) as source:
         scene = scenes.read_scene(source.document, source.name, reporter)

@@ -148,7 +148,7 @@ def test_a_picture(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> Non
         assert (tmp_path / f"e.{ending}").read_bytes().startswith(start)
         assert f"e.{ending}  " in run.err
     assert "--plot writes .png or .svg" in refusal(call("diff", *lifted, "--plot", tmp_path / "e.jpg"), 2)
-    assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 2)
+    assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 3)
 
 
 def test_a_picture_tells_two_files_of_one_name_apart(
