@@ -15,6 +15,8 @@ from anim.measure.error.surface import NUM_CORNERS, Surface, node_cubes
 from anim.model import Scene, Skeleton
 from anim.sampling.pose import PosedSkeleton
 
+SHELL_FRACTION = 0.01  # of the diagonal: usual distance of a shell's points from the node
+
 
 class ShellPoints:
     """P points around each of some nodes, each node a group.
@@ -63,6 +65,11 @@ class ShellPoints:
     def vertex(self, found: MaxDisplacement) -> int:
         """Return the index of the point that was found, −1 of a shell: its points are no vertices."""
         return found.vertex if self.has_vertices else -1
+
+    def is_shell(self, group: int) -> bool:
+        """Return whether the points are around nodes that move no vertex: all or none."""
+        del group
+        return not self.has_vertices
 
 
 def nodes_without_vertices(skeleton: Skeleton, surfaces: Sequence[Surface]) -> Bools:
