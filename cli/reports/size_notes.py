@@ -7,15 +7,15 @@ from collections.abc import Mapping
 from anim.model import Clip, Interpolation
 from anim.units import plural
 
-MIN_GROWTH = 1.25  # of a file's size; below, nobody asks for the reason
+MIN_GROWTH, MIN_GROWTH_BYTES = 1.25, 1000  # of a file's size; below, nobody asks for the reason
 
 
-def growth_note(before: Mapping[int, Clip], after: Mapping[int, Clip], *, size_ratio: float) -> str:
+def growth_note(before: Mapping[int, Clip], after: Mapping[int, Clip], sizes: tuple[int, int]) -> str:
     """Return a note that tangents made a file larger, or "".
 
-    before, after: clips by index. size_ratio: of the written file to the input.
+    before, after: clips by index. sizes: of the input and the written file, in bytes.
     """
-    if size_ratio < MIN_GROWTH:
+    if sizes[1] < max(MIN_GROWTH * sizes[0], sizes[0] + MIN_GROWTH_BYTES):
         return ""
     if not (count := len(_cubic_tracks(after) - _cubic_tracks(before))):
         return ""

@@ -155,7 +155,7 @@ def edit_together(
         before = text.format_bytes(size) if size == source.size else text.format_change(source.size, size)
         reporter.info(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
-    if words := growth_note(edited.before, edited.after, size_ratio=size / source.size):
+    if words := growth_note(edited.before, edited.after, (source.size, size)):
         reporter.info(f"note: {words}")
     reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
