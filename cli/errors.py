@@ -98,15 +98,18 @@ def common_options(text: str) -> str:
     return text.replace("`memory_limit`", "--memory-limit")
 
 
-def report_error(error: AnimError) -> int:
-    """Report an error as one line, with its help if any, and return the exit code."""
+def report_error(error: AnimError, *, is_shown: bool = False) -> int:
+    """Report an error as one line, with its help if any, and return the exit code.
+
+    is_shown: the user has read it already, in a report: then only the help is new.
+    """
     code = CODES.get(type(error), BUG)
     if code == BUG:
         vars(error).pop("__notes__", None)  # the help, which is written separately
         _print_trace()
     where = f"{quote(error.where)}: " if error.where else ""
     # Reports of several files print errors on their own, without the options of a command
-    _print_error(where + quote(error.problem), common_options(error.help))
+    _print_error("" if is_shown else where + quote(error.problem), common_options(error.help))
     return code
 
 
@@ -141,7 +144,8 @@ def _has_output(context: Any) -> bool:
 
 def _print_error(problem: str, hint: str) -> None:
     reporter = Reporter()  # the exit code stays the same if stderr is closed
-    reporter.info(f"{PROGRAM}: {problem}")
+    if problem:
+        reporter.info(f"{PROGRAM}: {problem}")
     if hint:
         reporter.info(f"help: {quote(hint)}")
 

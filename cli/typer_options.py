@@ -62,6 +62,16 @@ class Command(Parsing, TyperCommand):
         if any(each.name in OUTPUTS for each in self.params):
             self.params.append(_depfile_option())
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; values with units are checked here, so that steps of recipes are before any runs."""
+        parsed = super().parse_args(ctx, args)
+        for each in self.params:
+            if isinstance(value := ctx.params.get(each.name), str) and not ctx.resilient_parsing:
+                from cli.units import check_syntax
+
+                check_syntax(each.metavar or "", value, max(each.opts, key=len))
+        return parsed
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command; errors of the library name its options instead of parameters."""
         import numpy as np

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from anim import units
@@ -32,6 +32,24 @@ def parse_size(text: str, option: str) -> int:
     """Return a number of bytes above 0 from "800kB", "1.5MB" or "65536". Raises UsageError otherwise."""
     with _usage_errors():
         return units.parse_size(text, option)
+
+
+SYNTAX: Mapping[str, Callable[[str, str], object]] = {  # by metavar; 0 is the command's to refuse
+    "LENGTH": lambda text, option: units.is_zero(text) or units.parse_length(text, option, lambda: 1.0),
+    "ANGLE": lambda text, option: units.is_zero_angle(text) or units.parse_angle(text, option),
+    "FRACTION": lambda text, option: units.is_zero(text) or units.parse_fraction(text, option),
+    "SIZE": units.parse_size,
+}
+
+
+def check_syntax(metavar: str, text: str, option: str) -> None:
+    """Raise UsageError for a value that no model makes valid, before any file is read.
+
+    metavar: of the option, such as LENGTH; others than in `SYNTAX` have no units.
+    """
+    if metavar in SYNTAX:
+        with _usage_errors():
+            SYNTAX[metavar](text, option)
 
 
 @contextmanager

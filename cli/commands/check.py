@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -21,7 +21,7 @@ from anim.files import resolver
 from anim.units import plural
 from cli import errors
 from cli.errors import CheckError, UsageError
-from cli.io import documents
+from cli.io import documents, stdout
 from cli.options import common
 from cli.reports import check_ci, check_report, rule_list
 from cli.reports.check_report import CheckReport
@@ -199,27 +199,32 @@ def _report(
         documents.write_text(check_report.error_text(report))
     else:
         documents.write_text(WRITERS[format](report))
-    worst = _worst(report.refused, len(report.files))
+    is_read = format is Format.TEXT and stdout.is_read_with_stderr()
+    invalid = {name for name, each in report.found if each.code == INVALID.code}
+    worst = _worst(report.refused, len(report.files), shown=invalid if is_read else ())
     counted = [each for each in report.found if each[1].code != INVALID.code]
     bad = [each for each in counted if report.is_failure(*each)]
     if bad and not worst:
         order = list(Severity)  # most severe first
         name, first = min(bad, key=lambda each: order.index(each[1].severity))
         more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-        raise CheckError(f"{name}: {first.severity} {first.code} {first.name}: {first.where}: {first.problem}{more}")
+        error = CheckError(f"{name}: {first.severity} {first.code} {first.name}: {first.where}: {first.problem}{more}")
+        return errors.report_error(error, is_shown=is_read and first.severity is Severity.ERROR)
     return worst
 
 
-def _worst(refused: Sequence[tuple[str, AnimError]], files: int) -> int:
-    """Report unreadable files in one line; the exit code."""
+def _worst(refused: Sequence[tuple[str, AnimError]], files: int, shown: Collection[str] = ()) -> int:
+    """Report unreadable files in one line; the exit code. shown: those whose errors the user has read."""
+    is_shown = all(name in shown for name, _ in refused)
     if len(refused) < 2:
-        return max((errors.report_error(error.at(name, ": ")) for name, error in refused), default=errors.DONE)
+        codes = (errors.report_error(error.at(name, ": "), is_shown=is_shown) for name, error in refused)
+        return max(codes, default=errors.DONE)
     unread = [name for name, error in refused if not check_report.is_of_source(error)]
     of_sources = [name for name, error in refused if check_report.is_of_source(error)]
     problems = [f"{len(unread)} of {files} files can't be read: {_names(unread)}"] if unread else []
     if of_sources:
         problems.append(f"the sources of {len(of_sources)} of {files} files can't be read: {_names(of_sources)}")
-    return errors.report_error(FormatError("; ".join(problems)))
+    return errors.report_error(FormatError("; ".join(problems)), is_shown=is_shown)
 
 
 def _names(names: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from anim.gltf.io import images
+from anim.gltf.io import container, images
 from anim.gltf.io.source import external_files
 from cli import text
 from cli.errors import UsageError
@@ -35,7 +35,7 @@ def command(
     more: common.More = None,
     *,
     out: common.Out = None,
-    embed: Annotated[bool, typer.Option("--embed", help="Embed external images, if their files exist.")] = False,
+    embed: Annotated[bool, typer.Option("--embed", help="Embed images and buffers, if their files exist.")] = False,
     clip: Annotated[
         list[str] | None,
         typer.Option("--clip", metavar="GLOB", help="USD: the clip with this name or index ('#0')."),
@@ -52,9 +52,9 @@ def command(
 ) -> int:
     """Convert between .glb and .gltf, where nothing else changes, or to skinned USD.
 
-    A .glb contains buffer 0 in its binary chunk, and further buffers as data URIs. A .gltf has a companion .bin file.
-    The rest of the JSON stays: numbers, order, extras, unknown extensions. If the output is in another folder, external
-    images are copied beside it.
+    A .glb contains buffer 0 in its binary chunk, and further buffers as data URIs. A .gltf has a companion .bin file,
+    with --embed data URIs. The rest of the JSON stays: numbers, order, extras, unknown extensions. If the output is in
+    another folder, external images are copied beside it; --embed makes OUT one file.
 
     USD (extra usd) has the skeletons, skins and morph targets as UsdSkel, materials as UsdPreviewSurface, and one clip,
     sampled at a frame rate and interpolated linearly; a .usdz contains its images, for phones and other programs. If
@@ -103,7 +103,7 @@ def _convert(input: str, output: str, *, embed: bool, dry_run: bool, reporter: t
         document = source.document
         if embed:
             record_files(*external_files(source))
-            document = images.embed(document, source.folder)
+            document = container.embed_buffers(images.embed(document, source.folder))
         size = documents.write(document, output, source, dry_run=dry_run, reporter=reporter)
     if not dry_run and (embed or output == documents.PIPE or not source.is_in_folder(output)):
         copied = output != documents.PIPE

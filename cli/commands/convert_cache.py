@@ -60,7 +60,10 @@ def command(
             show_default=False,
         ),
     ] = None,
-    clip: common.Clips = None,
+    clip: Annotated[
+        list[str] | None,
+        typer.Option("--clip", metavar="GLOB", help="With --onto: the clip of FILE that IN is a bake of."),
+    ] = None,
     max_error: caches.MaxError = None,
     max_targets: caches.MaxTargets = None,
     keep_skeleton: caches.KeepSkeleton = False,
@@ -102,8 +105,13 @@ def command(
         "rest_mesh": rest_mesh,
         "max_targets": max_targets,
     }
-    if onto is None and (clip is not None or keep_skeleton):
-        raise UsageError(f"{'--keep-skeleton' if keep_skeleton else '--clip'} needs --onto FILE")
+    if onto is None and keep_skeleton:
+        raise UsageError("--keep-skeleton needs --onto FILE, whose skeleton it keeps")
+    if onto is None and clip is not None:
+        raise UsageError(
+            "--clip needs --onto FILE: it names the clip of FILE that IN is a bake of (a cache is one motion)",
+            help="to bake a clip of a glTF file: gltf-anim bake IN OUT --clip GLOB",
+        )
     moved = {"--up": up is not None, "--vertex-order": vertex_order is not None}
     check_cache_page(html, input, output, changed=[name for name, is_given in moved.items() if is_given])
     # Raises before any work for options that the format doesn't support.

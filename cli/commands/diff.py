@@ -150,8 +150,13 @@ def command(
         found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
     except AnimError as error:
         raise error.at(one.file.name, ": ") from None
+    alone = None
+    if found.clips and found.clips[0].error.is_around_node:  # so that the line has the figure that edits state, too
+        bare = ErrorMetric(one.scene, other.scene, clips=(*one.clips, *other.clips))
+        pairs = compared(bare, one.clips, other.clips, chosen=chosen, player=who, fps=fps).clips
+        alone = max(each.error.max_error for each in pairs)
     report = DiffReport(
-        one.file, other.file, found, *common_names(one, other), who, fps, radius, is_measured_at(one.scene)
+        one.file, other.file, found, *common_names(one, other), who, fps, radius, is_measured_at(one.scene), alone
     )
     if report.are_strangers:
         reporter.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")

@@ -206,8 +206,7 @@ def _check(
         raise UsageError("SOURCE and --onto can't both be stdin")
     if format is Format.JSON and output == documents.PIPE and not dry_run:
         raise UsageError("--format json and the GLB both want stdout", help="name an output file, or add --dry-run")
-    if not dry_run:
-        documents.check_output(output)
+    documents.check_output(output, dry_run=dry_run)
 
 
 def _meters_per_unit(motion: EulerMotion, scale: float | None, *, known: bool) -> tuple[float, str, bool]:

@@ -21,7 +21,7 @@ from anim.measure.inspect.report import ClipReport, Facts
 from anim.operations.selection import Selection
 from cli import errors, tables
 from cli.errors import CheckError, UsageError
-from cli.io import documents, input_files
+from cli.io import documents, input_files, stdout
 from cli.options import common
 from cli.reports import inspect_report, json_report
 from cli.reports.inspect_report import Inspected, Smoothness
@@ -106,11 +106,12 @@ def command(
         for i, inspected in enumerate(done):
             page = inspect_report.page(inspected, smooth[i], tracks=tracks)
             documents.write_text(("\n" if i else "") + page)
-    worst = max(map(errors.report_error, refused), default=errors.DONE)
+    is_shown = format is Format.TEXT and not quiet and stdout.is_read_with_stderr()
+    worst = max((errors.report_error(each, is_shown=is_shown) for each in refused), default=errors.DONE)
     if html is not None and worst == errors.DONE:
         _write_page(html, paths[0], done[0], Reporter(quiet))
     if fail_on is not None:
-        _check(done, fail_on)
+        return max(worst, _check(done, fail_on, is_shown=is_shown))
     return worst
 
 
@@ -143,8 +144,8 @@ def _named(fault: AnimError, name: str) -> AnimError:
     return copy(fault).at(name, ": ")
 
 
-def _check(done: list[Inspected], limit: Severity) -> None:
-    """Raise CheckError if a finding has severity `limit` or higher."""
+def _check(done: list[Inspected], limit: Severity, *, is_shown: bool) -> int:
+    """Report an error if a finding has severity `limit` or higher; the exit code."""
     bad = [
         (each.name, finding)
         for each in done
@@ -154,7 +155,9 @@ def _check(done: list[Inspected], limit: Severity) -> None:
     if bad:
         name, first = bad[0]
         more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-        raise CheckError(f"{name}: {first.severity} {first.name}: {first.where}: {first.problem}{more}")
+        error = CheckError(f"{name}: {first.severity} {first.name}: {first.where}: {first.problem}{more}")
+        return errors.report_error(error, is_shown=is_shown and first.severity is Severity.ERROR)
+    return errors.DONE
 
 
 def _inspected(path: str, selection: Selection, *, tracks: bool, continuity: bool) -> tuple[Inspected, Smoothness]:

@@ -85,6 +85,7 @@ def command(
     if find:
         raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
     many_files.refuse_folder(input, help='a recipe closes loops of many files: steps = ["loop"], then gltf-anim run')
+    documents.check_output(output or documents.PIPE, dry_run=dry_run)
     closing_of = _Closing(blend, input)
     edit_together(
         input,

@@ -66,7 +66,7 @@ def command(
         str | None,
         typer.Option(
             "--max-bytes",
-            metavar="N",
+            metavar="SIZE",
             help="Maximum file size, like 800kB: the smallest error found that fits, up to --max-error if given, "
             "else 10 % of the model's size.",
         ),

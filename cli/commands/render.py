@@ -23,6 +23,7 @@ from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.io.buffers import Resolve
 from anim.gltf.reading import reader
+from anim.gltf.reading.scene_nodes import faces_back
 from anim.model import VertexCache
 from anim.operations.selection import Selection
 from anim.show.filmstrip import clips, filmstrip, image_file
@@ -112,7 +113,10 @@ def command(
         int, typer.Option("--size", metavar="PX", help="Height of a frame in pixels.", min=32, max=4096)
     ] = HEIGHT,
     azimuth: Annotated[
-        float, typer.Option("--azimuth", metavar="DEG", help="Camera angle from the front (+Z) toward +X.")
+        float,
+        typer.Option(
+            "--azimuth", metavar="DEG", help="Camera angle from the figure's front (+Z; in VRM 0.x −Z) toward its left."
+        ),
     ] = AZIMUTH,
     elevation: Annotated[
         float, typer.Option("--elevation", metavar="DEG", help="Camera angle above the horizon.", min=-89, max=89)
@@ -145,7 +149,7 @@ def command(
     is_moving = ending != ".png"
     rate = fps or (FPS if is_moving and count is None and not at else None)
     when = FrameSelection(tuple(at or ()), count or (None if rate else _default_frames(shown)), rate, begin, end)
-    with _opened(input, reporter) as (seen, name, beside):
+    with _opened(input, reporter) as (seen, name, beside, front):
         if isinstance(seen, VertexCache):
             given = {"clip": clip, "method": method, "mesh": mesh, "hide": hide, "textures": textures}
             if unknown := next((name for name, value in given.items() if value), None):
@@ -175,7 +179,7 @@ def command(
             )
         rows, extent = clips.build_strips(found, heated=heat, followed=follow)
         title = " ".join(word for word in (PurePath(name).name, _one_clip(found)) if word)
-        look = ViewOptions(size, azimuth, elevation, checker, wire)
+        look = ViewOptions(size, front + azimuth, elevation, checker, wire)
         if is_moving:
             times = filmstrip.film_times(rows)
             pictures = filmstrip.animate_frames(rows, extent, title=title, look=look)
@@ -211,34 +215,40 @@ def _ending(output: str) -> str:
 
 
 @contextmanager
-def _opened(path: str, reporter: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, Resolve | None]]:
-    """Give a glTF document or a vertex cache, its name, and the resolver of its companion files.
+def _opened(path: str, reporter: text.Reporter) -> Iterator[tuple[Document | VertexCache, str, Resolve | None, float]]:
+    """Give a glTF document or a vertex cache, its name, the resolver of its companion files, and its front's azimuth.
 
-    The type follows from the file extension, for a pipe from the first bytes.
-
+    The type follows from the file extension, for a pipe from the first bytes. azimuth: degrees, from +Z.
     reporter: reports the notes of readers.
     """
     if path != documents.PIPE and suffix(path) in CACHE_FORMATS and suffix(path) not in (".glb", ".gltf"):
         with cache_files.load(path, ReadOptions()) as loaded:
             for words in loaded.notes:
                 reporter.warn(words)
-            yield loaded.cache, loaded.name, None
+            yield loaded.cache, loaded.name, None, 0.0
     elif path != documents.PIPE:
         with documents.source(path, reporter) as source:
             beside = None if source.folder is None else resolver.CompanionFiles(source.folder).open
-            yield flipbook_reader.read_pages(source.document) or source.document, source.name, beside
+            front = _front(source.document)
+            yield flipbook_reader.read_pages(source.document) or source.document, source.name, beside, front
     else:
         with documents.content(path) as (data, name):
             head = data[:SIGNATURE_BYTES].tobytes()
             if head.startswith(b"glTF") or head.lstrip()[:1] == b"{" or not len(data):
                 document = container.read(data, resolver.refuse_relative)
                 documents.repaired_note(document, name, reporter)
-                yield flipbook_reader.read_pages(document) or document, name, resolver.refuse_relative
+                pages = flipbook_reader.read_pages(document)
+                yield pages or document, name, resolver.refuse_relative, _front(document)
             else:
                 ending = sniff_format(head, len(data))
                 cache_files.check_pipe(name, ending)
                 reader = reader_for(ending)
-                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=reporter.warn)), name, None
+                yield reader(Memory(name, {name: data.tobytes()}), ReadOptions(note=reporter.warn)), name, None, 0.0
+
+
+def _front(document: Document) -> float:
+    """The azimuth of the figures' front, in degrees from +Z."""
+    return 180.0 if faces_back(document.json) else 0.0
 
 
 def _one_rate(document: Document, numbers: Sequence[int], when: FrameSelection) -> FrameSelection:

@@ -43,7 +43,7 @@ def command(
 
     Frame k is at the clip's start + k / fps; start and end stay exact. STEP tracks keep the times of their jumps, and
     constant tracks keep their keys. The last line reports the largest error of any vertex, measured on the written
-    file.
+    file, and a larger one around a node that moves no vertex, such as a socket.
     """
     if not fps > 0:
         raise UsageError(f"--fps is {fps:g} (expected a number above 0)")

@@ -90,7 +90,7 @@ def command(
     limit = None if angle_tolerance is None else units.parse_angle(angle_tolerance, "--angle-tolerance")
     orders = _orders(order, kind)
     _check(kind, unit, axes, scale, limit)
-    if output != documents.PIPE and not dry_run:
+    if output != documents.PIPE:
         documents.check_file(output)
     convention = Convention(DEFAULT_ORDER if orders.otherwise == AUTO else orders.otherwise, axes, unit)
     with documents.source(input, reporter) as source:

@@ -10,7 +10,7 @@ import difflib
 import io
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 
@@ -30,7 +30,7 @@ from anim.gltf.io.source import (
     open_file,
     write_file,
 )
-from anim.gltf.validation.extensions import unknown_required
+from anim.gltf.validation.extensions import PHYSICS, unknown_required
 from anim.units import list_some
 from cli import tables
 from cli.errors import UsageError
@@ -43,16 +43,19 @@ AUDIBLE = Reporter()
 
 
 @contextmanager
-def source(path: str, reporter: Reporter = AUDIBLE, opener: Opener = container.read) -> Iterator[Source]:
+def source(
+    path: str, reporter: Reporter = AUDIBLE, opener: Opener = container.read, *, uses: Collection[str] = ()
+) -> Iterator[Source]:
     """Give the document at `path`, "-" for stdin; errors raised inside name the input.
 
-    reporter: reports the fixes made on reading. opener: makes a document of bytes.
+    reporter: reports the fixes made on reading. opener: makes a document of bytes. uses: extensions that only this
+    command supports.
     """
     name = called(path)
     try:
         found = open_bytes(_stdin(resolver.read_gltf), name, opener) if path == PIPE else _open_file(path, opener)
         repaired_note(found.document, name, reporter)
-        _note_unknown_extensions(found.document, name, reporter)
+        _note_unknown_extensions(found.document, name, reporter, uses)
         yield found
     except (UsageError, OutputError):
         raise
@@ -89,11 +92,16 @@ def repaired_note(document: Document, name: str, reporter: Reporter) -> None:
     reporter.info(f"note: {name}: {problem}: taken apart into translation, rotation and scale")
 
 
-def _note_unknown_extensions(document: Document, name: str, reporter: Reporter) -> None:
-    if unknown := unknown_required(document.json):
+def _note_unknown_extensions(document: Document, name: str, reporter: Reporter, uses: Collection[str]) -> None:
+    required = [each for each in unknown_required(document.json) if each not in uses]
+    bodies = [each for each in required if each in PHYSICS]
+    if unknown := [each for each in required if each not in PHYSICS]:
         names = tables.quote(list_some(unknown))
         words = f"requires {names}, not supported here: kept as it is, and nothing is measured with it"
         reporter.info(f"note: {name}: {words}")
+    if bodies:
+        words = "kept as it is; bodies stay where the clips put them, simulate rigid moves them"
+        reporter.info(f"note: {name}: requires {list_some(bodies)}: {words}")
 
 
 def write(
@@ -178,12 +186,14 @@ def input_files(source: Source) -> list[Path]:
     return [] if source.folder is None else [Path(source.name), *external_files(source)]
 
 
-def check_output(path: str) -> None:
-    """Raise UsageError if glTF can't be written to `path` or its extension is another format's.
+def check_output(path: str, *, dry_run: bool = False) -> None:
+    """Raise UsageError or OutputError if glTF can't be written to `path` or its extension is another format's.
 
     A name without extension is a GLB; devices and named pipes (/dev/null) can have any name.
+    dry_run: a file must be possible all the same; stdout gets nothing.
     """
-    check_binary(path)
+    if path != PIPE or not dry_run:
+        check_binary(path)
     check_extension(path)
 
 
@@ -226,7 +236,7 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
         if path.endswith(("/", os.sep)):
             raise UsageError(f"{path}: there is no such folder (expected a file name)")
         if not target.parent.is_dir():
-            raise UsageError(f"{path}: there is no folder '{target.parent}'")
+            raise OutputError(f"{path}: there is no folder '{target.parent}'")
         if target.is_file() or not target.exists():
             from anim.files import atomic
 

@@ -31,6 +31,12 @@ def write_text(text: str) -> None:
     write([text.encode(errors="backslashreplace")])
 
 
+def is_read_with_stderr() -> bool:
+    """Return whether stdout and stderr are both a terminal, where errors of a report would be read twice."""
+    streams = sys.stdout, sys.stderr
+    return step_streams() is None and all(each is not None and each.isatty() for each in streams)
+
+
 def check_no_terminal() -> None:
     """Raise UsageError if stdout, for binary data, is a terminal."""
     if step_streams() is None and sys.stdout is not None and sys.stdout.isatty():

@@ -14,6 +14,7 @@ from anim.measure.inspect.storage_cost import StorageCost
 from anim.units import format_number, list_some, plural
 from cli import tables
 from cli.reports import json_report
+from cli.reports.error_place import describe_place
 from cli.text import format_change, format_length, format_speed
 
 SCHEMA = 1
@@ -40,6 +41,7 @@ class DiffReport(NamedTuple):
     nodes_by_name: number of nodes of the old file with a node of the same name in the new one. are_named: whether
     both files have names. player: of both files, or two, "spec,nlerp". fps: frames per second of the grid. shell: m.
     measured_at: "surface" or, where the old file has no vertices, "nodes".
+    max_vertex_error: m, of vertices alone, where the largest error is around a node that moves none; else None.
     """
 
     old: File
@@ -51,6 +53,7 @@ class DiffReport(NamedTuple):
     fps: float
     shell: float
     measured_at: str
+    max_vertex_error: float | None = None
 
     @property
     def clips_by_name(self) -> int:
@@ -110,7 +113,7 @@ def worst(found: DiffReport) -> str:
     vertex = f", vertex {error.vertex}" if error.vertex >= 0 else ""
     percent = f" ({_share(_percent(error.max_error, found.diff.diagonal))} %)" if found.diff.diagonal else ""
     clip = clip_name(each.name, each.old)
-    return f"{format_length(error.max_error)}{percent} in '{clip}' at '{error.joint}'{vertex}, {error.time:.3f} s"
+    return f"{format_length(error.max_error)}{percent} in '{clip}' {describe_place(error)}{vertex}, {error.time:.3f} s"
 
 
 def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
@@ -121,7 +124,7 @@ def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
     return [
         clip_name(each.name, each.old)
         + (f" → {clip_name(each.new_name, each.new)}" if each.new_name != each.name else ""),
-        error.joint,
+        f"around {error.place}" if error.is_around_node else error.joint,
         str(error.vertex) if error.vertex >= 0 else "",
         f"{error.time:.3f}" if moved else "",
         format_length(error.max_error),
@@ -159,6 +162,8 @@ def _summary(found: DiffReport) -> list[str]:
     old, new = found.old, found.new
     count = plural(len(found.diff.clips), "clip")
     motion = f"{count} compared, max {worst(found)}" if found.diff.clips else "no clips to compare"
+    if found.max_vertex_error is not None:
+        motion += f"; vertices: max {format_length(found.max_vertex_error)} (--shell 0)"
     if "," in found.player:
         return [motion, f"{old.name}, as shown by {found.player.replace(',', ' and ')}"]
     cost = f"animation {format_change(old.cost.total, new.cost.total)}"

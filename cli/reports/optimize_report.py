@@ -19,6 +19,7 @@ from anim.optimization.writing import KEY
 from anim.units import FEW, format_number, list_some, plural
 from cli.errors import CheckError
 from cli.reports import optimize_bound
+from cli.reports.error_place import describe_place
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
 
 
@@ -70,7 +71,7 @@ def check(found: Optimized, clips: Sequence[Clip], request: Request, scale: floa
         worst = max(bad, key=lambda i: bad[i].usage)
         off = bad[worst].error
         raise CheckError(
-            f"{reader.clip_label(clips[worst].name, worst)}: {_length(off.max_error, scale)} at '{off.joint}', "
+            f"{reader.clip_label(clips[worst].name, worst)}: {_length(off.max_error, scale)} {describe_place(off)}, "
             f"{off.time:.3f} s (bound {format_length(request.bounds.max_error)}); nothing was written"
         )
 
@@ -153,7 +154,7 @@ def _error_words(verdict: Verification, about: OptimizeReport, clip: str = "") -
     if error.max_error <= FLOAT_NOISE * about.scale:
         words = "no vertex moved"
     else:
-        where = f"{clip} at '{error.joint}', {error.time:.3f} s" if error.joint else clip
+        where = f"{clip} {describe_place(error)}, {error.time:.3f} s" if error.joint else clip
         words = _length(error.max_error, about.scale) + where
     if error.max_pointer_error > 0:
         words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"

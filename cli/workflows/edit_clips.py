@@ -21,6 +21,8 @@ from anim.measure.continuous_bound.largest_error import is_closed, largest_error
 from anim.measure.continuous_bound.prover import Proof, Prover
 from anim.measure.equal_clips import first_equal, repeat_change
 from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.surface import SHELL, diagonal, reference_length
+from anim.measure.error.whole_scene import WholeScene
 from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.memory import MemoryBudget
 from anim.model import Clip, Scene, Skeleton
@@ -29,7 +31,9 @@ from anim.units import format_number, plural
 from cli import text
 from cli.io import documents, scenes
 from cli.reports import image_notes
+from cli.reports.error_place import describe_place
 from cli.reports.rotation_notes import describe_non_unit_keys
+from cli.reports.size_notes import growth_note
 from cli.text import DRY, format_span, format_time
 
 Clips = Mapping[int, Clip]  # by index in the file
@@ -43,7 +47,8 @@ MAX_LISTED_CLIPS = 3  # clips listed with their durations; of more the sum
 class EditResult(NamedTuple):
     """Clips of a file before and after, by index, and the largest error on the surface.
 
-    at_nodes: whether only nodes were measured, because the surface could not be read.
+    at_nodes: whether only nodes were measured, because the surface could not be read. around: a larger error around a
+    node that moves no vertex, such as a socket.
     """
 
     before: dict[int, Clip]
@@ -51,6 +56,7 @@ class EditResult(NamedTuple):
     worst: Proof | None
     diagonal: float
     at_nodes: bool = False
+    around: Proof | None = None
 
 
 def edit_clips(
@@ -150,6 +156,8 @@ def edit_together(
         before = text.format_bytes(size) if size == source.size else text.format_change(source.size, size)
         reporter.info(f"{name}  {before}, unchanged: {why}{DRY if dry_run else ''}")
         return
+    if words := growth_note(edited.before, edited.after, (source.size, size)):
+        reporter.info(f"note: {words}")
     reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
@@ -184,7 +192,10 @@ def _measured(
         scenes.warn_of_scene(scene, source.document, source.name, reporter, accessors=accessors)
     else:
         scenes.warn_of_nodes(error, "surface", reporter)
-    prover = Prover(ErrorMetric(scene, clips=(*edited.before.values(), *edited.after.values())))
+    clips = *edited.before.values(), *edited.after.values()
+    whole = WholeScene.of(scene, diagonal(scene))
+    shell = SHELL * reference_length(whole.diagonal)
+    prover = Prover(ErrorMetric(scene, shell=shell, clips=clips, whole=whole))
     pairs = [(before, edited.after[i]) for i, before in edited.before.items()]
     first = first_equal(pairs)
     _warn_of_non_unit_keys(edited, first, reporter)
@@ -199,7 +210,11 @@ def _measured(
         worst = worst_proof(list(found.values()))
     else:
         worst = largest_error_of(prover, [pairs[n] for n in distinct])
-    return EditResult(edited.before, edited.after, worst, prover.ruler.diagonal, error is not None)
+    around = worst if worst is not None and worst.error.is_around_node else None
+    if around is not None:
+        around = around._replace(error=around.error._replace(max_pointer_error=0.0))  # stated by the other
+        worst = largest_error_of(Prover(ErrorMetric(scene, clips=clips)), [pairs[n] for n in distinct])
+    return EditResult(edited.before, edited.after, worst, prover.ruler.diagonal, error is not None, around)
 
 
 def _warn_of_non_unit_keys(edited: EditResult, first: Sequence[int], reporter: text.Reporter) -> None:
@@ -227,6 +242,8 @@ def _summary(name: str, before: int, after: int, edited: EditResult, seconds: fl
     parts += filter(None, [clip_lengths(edited.before, edited.after)])
     if edited.worst is not None:
         parts.append(_error(edited.worst, edited.diagonal) + (" (nodes only)" if edited.at_nodes else ""))
+    if edited.around is not None:
+        parts.append(_error(edited.around, edited.diagonal))
     parts.append(text.format_duration(seconds))
     return ", ".join(parts) + (DRY if dry_run else "")
 
@@ -235,7 +252,7 @@ def _error(found: Proof, diagonal: float) -> str:
     """The largest error as text; "at least" if errors between the sampled times are not bounded."""
     error = found.error
     least = "" if is_closed(found, diagonal) else "at least "
-    where = f" at '{error.joint}', {error.time:.3f} s" if error.max_error and error.joint else ""
+    where = f" {describe_place(error)}, {error.time:.3f} s" if error.max_error and error.joint else ""
     words = f"max {least}{text.format_length(error.max_error)}{text.format_fraction(error.max_error, diagonal)}{where}"
     if error.max_pointer_error > 0:
         words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"

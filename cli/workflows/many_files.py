@@ -44,6 +44,9 @@ def edit_named(
             help = "the command takes IN and OUT; for more inputs name their outputs by --out"
             raise UsageError(f"got unexpected extra argument ({more[0]})", help=help)
         refuse_folder(input, help="all its files: -o 'out/{path}'")
+        if dry_run and output != documents.PIPE:  # here, since folders of --out are made when files are written
+            check(output)
+            documents.check_file(output, None)
         edit(input, output)
         return errors.DONE
     if not pattern:

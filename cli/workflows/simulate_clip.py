@@ -35,6 +35,7 @@ def simulate_clip(
     report: str | None,
     dry_run: bool,
     others: Collection[str] = (),
+    uses: Collection[str] = (),
 ) -> None:
     """Simulate on one clip of a file, write the file and the report, and sum up in one line on stderr.
 
@@ -42,14 +43,15 @@ def simulate_clip(
     without tracks where the file has none, and its index; returns the document, or the bytes of a file of another
     format, the report, and a summary. The file and the report are both written, or neither. The report of an
     UnstableError is written too, before it is raised again.
-    others: extensions of other formats.
+    others: file extensions of other formats. uses: glTF extensions that only this simulation supports.
     """
     began = time.perf_counter()
-    if not dry_run:
-        is_other = output != documents.PIPE and PurePath(output).suffix.lower() in others
-        (documents.check_file if is_other else documents.check_output)(output)
+    if output != documents.PIPE and PurePath(output).suffix.lower() in others:
+        documents.check_file(output)
+    else:
+        documents.check_output(output, dry_run=dry_run)
     check_report(report)
-    with documents.source(input, reporter) as source:
+    with documents.source(input, reporter, uses=uses) as source:
         scene = scenes.read_scene(source.document, source.name, reporter)
         index = driving_clip(source.document, clip)
         driver = NO_CLIP if index is None else reader.clips(source.document)[index]

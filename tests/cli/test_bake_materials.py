@@ -167,7 +167,9 @@ def test_refusals_of_onto(call: Call, textured_path: Path, fixture: Any) -> None
     assert "the cache has 36 vertices, the meshes of the source have 530" in refusal(run, 2)
     assert "in the order of the file" in help_line(run)
     assert "--onto does not apply to .npz" in refusal(call("convert-cache", cache, "b.npz", "--onto", textured_path), 2)
-    assert "--clip needs --onto" in refusal(call("convert-cache", cache, out, "--clip", "bend"), 2)
+    refused = call("convert-cache", cache, out, "--clip", "bend")
+    assert "--clip needs --onto FILE: it names the clip of FILE that IN is a bake of" in refusal(refused, 2)
+    assert help_line(refused) == "to bake a clip of a glTF file: gltf-anim bake IN OUT --clip GLOB"
     assert "--keep-skeleton does not apply" in refusal(call("bake", textured_path, cache, "--keep-skeleton"), 2)
 
 

@@ -8,7 +8,6 @@ import pytest
 
 from anim.errors import OutputError
 from anim.files import resolver
-from cli.errors import UsageError
 from cli.io import documents
 
 
@@ -21,6 +20,7 @@ def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypat
         documents.check_file("closed/out.glb")
 
 
-def test_a_folder_that_is_not_there_is_one(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="there is no folder"):
+def test_a_folder_that_is_not_there_is_none_either(tmp_path: Path) -> None:
+    """As a file that can't be read."""
+    with pytest.raises(OutputError, match="there is no folder"):
         documents.check_file(str(tmp_path / "missing" / "out.glb"))

@@ -173,3 +173,22 @@ def test_the_line_on_stderr_is_about_the_worst_finding(folder: Path, call: Call)
     (folder / "gltf-anim.toml").write_text('[[budget]]\nmatch = "noop.glb"\nbytes = 1\n')
     run = call("check", "noop.glb", "--fail-on", "info")
     assert run.err.startswith("gltf-anim: noop.glb: error GA402 over-budget: bytes: ")
+
+
+@pytest.mark.parametrize("command", ["check", "inspect"])
+def test_a_terminal_shows_an_error_once(
+    command: str, folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The line on stderr is for those who redirect the report; where they read both, only its help is new."""
+    path = folder / "broken.gltf"
+    path.write_text('{"asset": {"version": "2.0"}, "nodes": [{"mesh": 1}]}')
+    problem = "is 1 (the file has 0 meshes)"
+    apart = call(command, path)
+    assert (apart.code, apart.text.count(problem), apart.err.count(problem)) == (3, 1, 1)
+    for stream in (sys.stdout, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: True)
+    together = call(command, path)
+    assert (together.code, together.text, together.err) == (3, apart.text, "")
+    quiet = call(command, path, "-q")
+    assert (quiet.text + quiet.err).count(problem) == 1
+    assert call(command, path, "--format", "json").err.count(problem) == 1

@@ -154,7 +154,6 @@ def test_missing_files(name: str, tmp_path: Path, call: Call) -> None:
         (["a.npz", "--fps", "0"], "--fps is 0 (expected a number above 0)"),
         (["a.npz", "--input-fps", "-1"], "--input-fps is -1 (expected 1e-06 to 1e+06)"),
         (["a.npz", "--input-fps", "1e18"], "--input-fps is 1e+18 (expected 1e-06 to 1e+06)"),
-        (["no/a.npz"], "there is no folder"),
     ],
 )
 def test_what_can_t_be_done_is_exit_2(args: list[str], words: str, walk: Path, call: Call) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Call
-from tests.cli.running import refusal
+from tests.cli.conftest import Call, Fixture
+from tests.cli.running import built, refusal
 from tests.fixtures.reading import split
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(20)
@@ -81,6 +81,27 @@ def test_embed_takes_images_in(call: Call, tmp_path: Path) -> None:
     assert images[0] == {"uri": "data:image/png;base64," + base64.b64encode(PNG).decode(), "name": "skin"}
     assert images[1] == {"uri": "data:image/jpeg;base64," + base64.b64encode(JPEG).decode()}
     assert images[2] == {"uri": "data:image/png;base64,AAAA"}
+
+
+def test_embed_makes_a_gltf_of_one_file(call: Call, fixture: Fixture, tmp_path: Path) -> None:
+    """The same bytes as a GLB, whether the buffer was in a GLB, beside a .gltf or embedded."""
+    (tmp_path / "out").mkdir()
+    for name in ("arm", "gltf_external", "gltf_embedded"):
+        path = fixture(name)
+        whole = call("convert", path, "-").product()
+        call("convert", path, tmp_path / "out/scene.gltf", "--embed").product()
+        assert [each.name for each in (tmp_path / "out").iterdir()] == ["scene.gltf"]
+        (buffer,) = json.loads((tmp_path / "out/scene.gltf").read_text())["buffers"]
+        assert buffer["uri"].startswith("data:application/octet-stream;base64,")
+        assert call("convert", tmp_path / "out/scene.gltf", "-").product() == whole
+
+
+def test_embed_in_place_removes_the_buffer(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "arm.gltf"
+    call("convert", "-", path, stdin=built("arm")).product()
+    assert (tmp_path / "arm.bin").exists()
+    call("convert", path, path, "--embed").product()
+    assert [each.name for each in tmp_path.iterdir()] == ["arm.gltf"]
 
 
 def test_embed_does_what_it_can_and_says_what_is_missing(call: Call, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -148,7 +149,7 @@ def test_a_picture(lifted: tuple[Path, Path], tmp_path: Path, call: Call) -> Non
         assert (tmp_path / f"e.{ending}").read_bytes().startswith(start)
         assert f"e.{ending}  " in run.err
     assert "--plot writes .png or .svg" in refusal(call("diff", *lifted, "--plot", tmp_path / "e.jpg"), 2)
-    assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 2)
+    assert "there is no folder" in refusal(call("diff", *lifted, "--plot", tmp_path / "no" / "e.png"), 3)
 
 
 def test_a_picture_tells_two_files_of_one_name_apart(
@@ -203,6 +204,31 @@ def _lifted(document: Document) -> Document:
     values[7, 1] += LIFT
     tracks = (*walk.tracks[:index], replace(walk.tracks[index], values=values), *walk.tracks[index + 1 :])
     return writer.replace_clips(document, {number: Clip(walk.name, tracks)})
+
+
+def test_an_edit_states_the_errors_that_diff_finds(tmp_path: Path, call: Call) -> None:
+    """A camera swings by 90°, while the mesh beside it moves little; both lines have both figures and their places."""
+    document = opened_fixture("arm")
+    nodes = [*document.json["nodes"], {"name": "camera"}]
+    number = len(nodes) - 1
+    document = replace(document, json={**document.json, "nodes": nodes, "scenes": _with_root(document, number)})
+    swing = track("rotation", np.linspace(0, 1, 5), about("y", [0, 90, 0, 90, 0]), node=number)
+    tracks = (*reader.clips(document)[0].tracks, swing)
+    path = saved(tmp_path / "a.glb", writer.replace_clips(document, {0: Clip("swing", tracks)}))
+    edit = call("resample", path, tmp_path / "b.glb", "--fps", "1.4")
+    alone = call("resample", path, "-", "--fps", "1.4", "--node", "camera", "--dry-run")
+    compared = call("diff", path, tmp_path / "b.glb").text
+    place = "around 'camera', which moves no vertex, "
+    stated = re.search(rf", max (\S+ \S+) .* s, max (\S+ \S+) \(.* %\) {place}", edit.err)
+    assert stated, edit.err
+    vertices, around = stated.groups()
+    assert f"max {around} (" in compared
+    assert f"in 'swing' {place}" in compared
+    assert f"; vertices: max {vertices} (--shell 0)\n" in compared
+    assert f", max 0 mm, max {around} (" in alone.err
+    bare = call("diff", path, tmp_path / "b.glb", "--shell", "0").text
+    assert f"max {vertices} (" in bare
+    assert place not in bare
 
 
 def _with_root(document: Document, node: int) -> list[dict[str, Any]]:

@@ -39,6 +39,13 @@ def test_says_when_easing_will_stutter_and_when_values_overshoot(call: Call, fix
     assert "scale" in run.err
 
 
+def test_says_why_a_file_is_larger(call: Call, fixture: Fixture) -> None:
+    path = fixture("interpolations")
+    words = "three values per key instead of one; optimize removes"
+    assert words in call("ease", path, "-").err
+    assert words not in call("ease", path, "-", "--interpolation", "linear").err
+
+
 def test_per_range_keeps_the_clips_ends(call: Call, fixture: Fixture) -> None:
     clip = clips_of(
         call("ease", fixture("biped"), "--clip", "walk", "--per", "range", "--ease", "ease", "-q").product()

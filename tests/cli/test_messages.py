@@ -6,9 +6,10 @@ import re
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
+import typer
 
 import fixtures
 from anim.errors import (
@@ -21,7 +22,8 @@ from anim.errors import (
     UnsupportedError,
     not_written,
 )
-from cli import errors
+from cli import errors, main
+from cli.command_table import COMMANDS
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, help_line, refusal, shell
 from tests.files import glb_of, opened_fixture
@@ -233,14 +235,55 @@ def test_a_buffer_that_is_not_beside_its_gltf_says_where_to_put_it(
 
 
 @pytest.mark.parametrize("command", [["convert"], ["resample", "--fps=3"], ["sample"]])
-def test_outputs_that_cannot_be_written_are_2_before_any_work(command: list[str], call: Call, tmp_path: Path) -> None:
+def test_outputs_that_cannot_be_written_are_named_before_any_work(
+    command: list[str], call: Call, tmp_path: Path
+) -> None:
     name, *rest = command
-    lost = tmp_path / "lost.glb"  # would be exit 3
+    lost = tmp_path / "lost.glb"  # would be named
     missing, kind = tmp_path / "no" / "out.json", tmp_path / "a.json"
     kind.mkdir()
-    assert "out.json: there is no folder" in refusal(call(name, lost, missing, *rest), 2)
+    assert "out.json: there is no folder" in refusal(call(name, lost, missing, *rest), 3)
     assert "is a folder (expected a file name)" in refusal(call(name, lost, kind, *rest), 2)
     assert "the output has an empty name" in refusal(call(name, lost, "", *rest), 2)
+
+
+DRY_RUNS = (
+    "bake lost.glb no/out.npz",
+    "convert lost.glb no/out.gltf",
+    "convert lost.glb no/out.usdz",
+    "convert-cache lost.npz no/out.pc2",
+    "ease lost.glb no/out.glb",
+    "from-euler lost.bvh no/out.glb",
+    "loop lost.glb no/out.glb",
+    "optimize lost.glb no/out.glb",
+    "resample lost.glb no/out.glb --fps 3",
+    "retime lost.glb no/out.glb --speed 2",
+    "simulate cloth lost.glb no/out.glb --mesh flag",
+    "simulate particles lost.glb no/out.glb --node head",
+    "simulate particles lost.glb no/out.npz --node head",
+    "simulate rigid lost.glb no/out.glb",
+    "simulate springs lost.glb no/out.glb",
+    "spline lost.glb no/out.glb",
+    "to-euler lost.glb no/out.bvh",
+    "trim lost.glb no/out.glb --to 1",
+)
+
+
+@pytest.mark.parametrize("line", DRY_RUNS)
+def test_a_dry_run_names_a_missing_folder_too(line: str, call: Call) -> None:
+    assert "there is no folder 'no'" in refusal(call(*line.split(), "--dry-run"), 3)
+
+
+def test_dry_runs_are_all_tried() -> None:
+    """A command with --dry-run is in the list above; check has no OUT."""
+    group: Any = typer.main.get_command(main.app)
+    dry = {name for name in COMMANDS if _has_dry_run(group.get_command(None, name))}
+    assert dry - {line.split()[0] for line in DRY_RUNS} == {"check"}
+
+
+def _has_dry_run(command: Any) -> bool:
+    kinds = [command.get_command(None, kind) for kind in getattr(command, "table", ())]
+    return any(param.name == "dry_run" for each in (command, *kinds) for param in each.params)
 
 
 @pytest.mark.parametrize("ending", ["json", "csv", "npz", "fbx", "BIN", "pc2"])

@@ -35,8 +35,6 @@ FAST = ("--effort", "fast")
         (("--meshopt", "draco"), "'draco'"),
         (("--jobs", "-1"), "-1"),
         (("--curve", "c.txt"), "c.txt: is no .csv, .png or .svg file"),
-        (("--curve", "nowhere/c.csv"), "there is no folder"),
-        (("--report", "nowhere/r.json"), "there is no folder"),
         (("--report", "r.glb"), "r.glb: --report would take the place of a model"),
         (("--curve", "c.csv", "--max-bytes", "1kB"), "--curve goes with neither"),
         (("--curve", "c.csv", "--report", "-"), "--curve goes with neither"),
@@ -48,6 +46,12 @@ def test_options_out_of_range(
     run = call("optimize", fixture("arm"), tmp_path / "out.glb", *options)
     assert problem in refusal(run, 2)
     assert not (tmp_path / "out.glb").exists()
+
+
+@pytest.mark.parametrize("options", [("--curve", "nowhere/c.csv"), ("--report", "nowhere/r.json")])
+def test_a_missing_folder_is_named_before_any_work(options: tuple[str, ...], tmp_path: Path, call: Call) -> None:
+    run = call("optimize", tmp_path / "lost.glb", tmp_path / "out.glb", *options)
+    assert "there is no folder 'nowhere'" in refusal(run, 3)
 
 
 def test_names_that_do_not_exist(fixture: Fixture, call: Call) -> None:

@@ -13,10 +13,12 @@ from tests.browser import evaluate, needs_browser
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import built
 from tests.cli.test_table import renamed
+from tests.files import glb_of, opened_fixture
 
 pytestmark = [pytest.mark.slow, needs_browser]
 ROWS = "[...document.querySelectorAll('#list-report button.row')]"
 DOWN = "(document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowDown', bubbles: true })), true)"
+PRESS = "document.body.dispatchEvent(new KeyboardEvent('keydown', { key: '%s', bubbles: true }))"
 
 
 def test_the_address_keeps_lists_and_empty_choices(call: Call, tmp_path: Path) -> None:
@@ -168,3 +170,17 @@ def test_no_legend_of_heat_beside_a_clip_that_the_other_file_lacks(call: Call, t
     shown = "!document.querySelector('#legend').hidden"
     codes = [f"(player.chooseClip({clip}), {shown})" for clip in (0, 1, 0)]
     assert evaluate(page, [("", codes)]) == [[True, False, True]]
+
+
+def test_figures_of_vrm_0_are_seen_from_their_front(call: Call, tmp_path: Path) -> None:
+    document = opened_fixture("biped")
+    named = {"extensions": {"VRM": {}}, "extensionsUsed": ["VRM"]}
+    offset = "player.stage.camera.position.clone().sub(player.stage.controls.target).toArray()"
+    keys = [f"({PRESS % key}, {offset})" for key in "137"]
+    seen = []
+    for json in (document.json, {**document.json, **named}):
+        (tmp_path / "a.glb").write_bytes(glb_of(replace(document, json=json)))
+        call("view", tmp_path / "a.glb", "-o", tmp_path / "a.html").product()
+        seen += evaluate(tmp_path / "a.html", [("", [offset, *keys])])
+    assert np.allclose(np.array(seen[1]) * (-1, 1, -1), seen[0], atol=0.02)  # what is framed is not symmetric
+    assert seen[0][1][2] > 1

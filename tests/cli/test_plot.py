@@ -166,7 +166,7 @@ def test_the_title_of_integrators_fits(omega: str, step: str, title: str, call: 
     [
         (["biped.glb", "out.pdf"], 2, "out.pdf: is no .png or .svg file"),
         (["biped.glb", "out.png", "more.png"], 2, "3 files are named (expected IN and OUT)"),
-        (["biped.glb", "nowhere/out.png"], 2, "there is no folder"),
+        (["biped.glb", "nowhere/out.png"], 3, "there is no folder"),
         (["biped.glb", "out.png", "--limit", "0"], 2, "--limit is 0"),
         (["biped.glb", "out.png", "--clip", "wlak"], 5, "no clip matches 'wlak'"),
         (["biped.glb", "out.png", "--node", "nobody"], 5, "no node matches 'nobody'"),

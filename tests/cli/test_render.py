@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from anim.caches.registry import CACHE_FORMATS, Files
 from tests.anim.caches.making import cache, written
 from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import built, help_line, refusal
+from tests.files import glb_of, opened_fixture
 
 SMALL = ("--size", "64")
 
@@ -252,3 +254,15 @@ def test_a_gltf_with_a_buffer_beside_it_needs_its_path(call: Call) -> None:
     run = call("render", "-", "-", stdin=built("gltf_external"))
     assert "'walk data.bin' lies beside the file, but the input is a pipe" in refusal(run, 3)
     assert help_line(run) == "give the file's path, or pipe a GLB"
+
+
+@pytest.mark.parametrize(
+    ("extensions", "azimuth"), [(("VRM",), "215"), (("VRMC_vrm",), "35"), (("VRM", "VRMC_vrm"), "35")]
+)
+def test_figures_of_vrm_0_are_drawn_from_their_front(extensions: tuple[str, ...], azimuth: str, call: Call) -> None:
+    document = opened_fixture("arm")
+    named = {"extensions": {name: {} for name in extensions}, "extensionsUsed": list(extensions)}
+    turned = glb_of(replace(document, json={**document.json, **named}))
+    options = ("-", "-", "--frames", "1", "--size", "64")
+    expected = call("render", *options, "--azimuth", azimuth, stdin=built("arm")).product()
+    assert call("render", *options, stdin=turned).product() == expected

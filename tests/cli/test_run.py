@@ -14,7 +14,7 @@ import typer
 from cli import main
 from cli.command_table import COMMANDS
 from cli.workflows.run.steps import EDITING, MAKING, REFUSED
-from tests.cli.conftest import Call
+from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, help_line, refusal
 from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, write_recipe
 
@@ -30,6 +30,28 @@ def test_the_output_is_that_of_single_commands(folder: Path, call: Call) -> None
         made = call("resample", f"crowd/{name}.glb", "--fps", "30").product()
         made = call(*STEPS[1].split(), stdin=made).product()
         assert (folder / "build" / "crowd" / f"{name}.glb").read_bytes() == made
+
+
+@pytest.mark.parametrize("step", ["resample --fps 12", "convert", "convert --embed", "optimize --effort fast"])
+def test_a_text_is_that_of_a_single_command(step: str, folder: Path, call: Call, fixture: Fixture) -> None:
+    """The product of a step is a GLB, in which a buffer is no data URI and the text has no indent."""
+    (folder / "single").mkdir()
+    for name in ("gltf_embedded", "gltf_external"):
+        fixture(name)
+        command, *options = step.split()
+        call(command, f"{name}.gltf", f"single/{name}.gltf", *options).product()
+    write_recipe(folder, step, match="*.gltf", out="build/{name}")
+    for state in ("made", "cached"):
+        assert f"2 {state}" in call("run").err
+        expected = {path.name: path.read_bytes() for path in (folder / "single").iterdir()}
+        assert {path.name: path.read_bytes() for path in (folder / "build").iterdir()} == expected
+        shutil.rmtree(folder / "build")
+
+
+def test_a_last_step_embeds_buffers_of_a_text(folder: Path, call: Call) -> None:
+    write_recipe(folder, *PLAIN, "convert --embed", out="build/{stem}.gltf")
+    call("run").product()
+    assert [path.name for path in (folder / "build").iterdir()] == ["arm 1.gltf"]
 
 
 def test_a_second_run_makes_nothing(folder: Path, call: Call) -> None:
@@ -217,6 +239,11 @@ def test_the_cache_is_ignored_by_git(folder: Path, call: Call) -> None:
         (["trim --clip 'a\0b' --to 1"], "step 1 has a null character", ""),
         (["resample --fps x"], "invalid value for '--fps': 'x' is no number", "resample --help"),
         (["resample"], "missing option '--fps'", ""),
+        (["resample --fps 3", "optimize --max-error '5 parsecs'"], "step 2: --max-error is '5 parsecs' (expected", ""),
+        (["optimize --max-bytes 3lb"], "step 1: --max-bytes is '3lb' (expected a size like", ""),
+        (["ease --tolerance 1mm"], "step 1: --tolerance is '1mm' (expected a share", ""),
+        (["simulate springs --max-error 1deg"], "step 1: --max-error is '1deg' (expected a length", ""),
+        (["simulate particles --node '*' --spread 5"], "step 1: --spread is '5' (expected an angle", ""),
         (["optimize --report a.json"], "--report writes a file for every file", ""),
         (["resample --fps 3 --depfile a.d"], "--depfile is about one file", ""),
         (["ease --help"], "--help makes no glTF", ""),

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.running import ENVIRONMENT, help_line, refusal
+from tests.cli.running import ENVIRONMENT, built, help_line, refusal
 from tests.cli.running_recipes import write_crowd, write_recipe
 
 TOOLS = {"shell": ["bash", "-e"], "make": ["make", "-j2", "-f"], "ninja": ["ninja", "-f"]}
@@ -32,6 +32,9 @@ def test_a_script_makes_what_a_run_makes(tool: str, folder: Path, call: Call) ->
     call("convert", "crowd/hero.glb", "crowd/text.gltf").product()
     write_recipe(folder, "resample --fps 12", "trim --to 0.5 --clip '*'")
     write_recipe(folder, "resample --fps 12", match="crowd/*.gltf", out="build/{stem}.gltf")
+    (folder / "embedded.gltf").write_bytes(built("gltf_embedded"))
+    write_recipe(folder, "resample --fps 12", match="*.gltf", out="build/{stem}.gltf")
+    write_recipe(folder, "resample --fps 12", "convert --embed", match="*.glb", out="build/{stem}.gltf")
     call("run", "-q").product()
     made = outputs(folder)
     assert {"build/crowd/hero.glb", "build/crowd/$home.glb", "build/text.gltf"} < made.keys()

@@ -188,4 +188,4 @@ def test_a_file_of_another_kind_is_never_written_over(name: str, call: Call, tmp
 
 def test_a_missing_folder_is_named_before_any_work(call: Call, tmp_path: Path) -> None:
     run = call("sample", tmp_path / "nowhere.glb", tmp_path / "no" / "poses.csv")
-    assert "poses.csv: there is no folder" in refusal(run, 2)
+    assert "poses.csv: there is no folder" in refusal(run, 3)

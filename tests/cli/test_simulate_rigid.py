@@ -51,6 +51,17 @@ def test_bodies_of_the_extension_need_no_option(call: Call) -> None:
 
 
 @needs_rapier
+def test_required_physics_is_noted_where_it_is_not_used(call: Call) -> None:
+    required = {"extensionsRequired": ["KHR_implicit_shapes", "KHR_physics_rigid_bodies"]}
+    data = json.dumps(json.loads(BOX_AND_FLOOR) | required).encode()
+    run = call("simulate", "rigid", "-", "-", stdin=data)
+    assert "note: " not in run.err
+    words = "requires KHR_implicit_shapes, KHR_physics_rigid_bodies: kept as it is; bodies stay"
+    assert words in call("convert", "-", "-", stdin=run.product()).err
+    assert "is required but used by simulate rigid only" in call("check", "-", stdin=data).text
+
+
+@needs_rapier
 def test_tracks_are_put_into_the_driving_clip(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     """The first hop drives; the bricks of the second run replace those of the first."""
     out, merged = tmp_path / "out.glb", tmp_path / "merged.glb"

@@ -10,6 +10,10 @@ from anim.check.edits import replace_clips, single_keys
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule, counted
 from anim.gltf.document import Document
+from anim.measure.inspect.track_statistics import KEY_TOLERANCE_PER_RANGE
+from anim.units import format_number
+
+WITHIN = f"within {format_number(100 * KEY_TOLERANCE_PER_RANGE, 2)} % of the track's range"
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -36,12 +40,12 @@ RULE = Rule(
     "GA111",
     "redundant-keys",
     Severity.INFO,
-    "Keys are interpolated exactly by their neighbors.",
-    "They cost bytes and change nothing.",
+    f"Keys are interpolated by their neighbors, {WITHIN}.",
+    "They cost bytes, and a difference that small is not visible.",
     find,
     counted(
-        "redundant key (interpolated exactly by its neighbors)",
-        "redundant keys (interpolated exactly by their neighbors)",
+        f"redundant key (interpolated by its neighbors {WITHIN})",
+        f"redundant keys (interpolated by their neighbors {WITHIN})",
     ),
     "to remove those that no vertex needs: gltf-anim optimize IN OUT",
     fix=Fix("remove them", fix, is_safe=True, yields_to=frozenset({"GA102"})),

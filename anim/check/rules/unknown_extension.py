@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule
-from anim.gltf.validation.extensions import unknown_required
+from anim.gltf.validation.extensions import PHYSICS, unknown_required
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the extensions."""
     for name in unknown_required(file.json):
-        problem = f"{name} is required but not supported here"
+        use = "used by simulate rigid only" if name in PHYSICS else "not supported here"
+        problem = f"{name} is required but {use}"
         yield Occurrence("extensionsRequired", "/extensionsRequired", problem=problem, name=name)
 
 

@@ -141,6 +141,17 @@ def gltf(
     return files
 
 
+def embed_buffers(document: Document) -> Document:
+    """Return the document with all buffers as data URIs, where it is written as a .gltf."""
+    return replace(document, buffers=tuple(map(_embedded, document.buffers)))
+
+
+def _embedded(buffer: Buffer) -> Buffer:
+    if not buffer.has_data or (buffer.uri is not None and uri.is_data(buffer.uri)):
+        return buffer
+    return Buffer(buffer.byte_length, uri.encode_data(b""), lambda: buffer.data, replaced=True)
+
+
 def _too_large(size: int) -> UnsupportedError:
     return UnsupportedError(f"a GLB can't hold {size} bytes (its limit is {MAX_GLB_BYTES})", help="write a .gltf")
 

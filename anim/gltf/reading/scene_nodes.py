@@ -53,6 +53,12 @@ def is_default_scene_empty(document: Document) -> bool:
     return len(mesh_nodes_of_other_scenes(document)) == meshes
 
 
+def faces_back(json: Json) -> bool:
+    """Return whether figures look along −Z, as those of VRM 0.x do; along +Z in glTF and VRM 1.0."""
+    extensions = json.get("extensions", {})
+    return "VRM" in extensions and "VRMC_vrm" not in extensions
+
+
 def instanced_nodes(json: Json) -> list[int]:
     """Return the indices of the nodes with mesh instances."""
     nodes = enumerate(json_array(json, "nodes"))

@@ -11,6 +11,12 @@ KNOWN_REQUIRED = frozenset(
     KHR_texture_basisu KHR_texture_transform
     """.split()  # noqa: SIM905 (one name per line would hide the words)
 )
+# Bodies, which `simulate rigid` moves; for all other commands they stay where the clips put them.
+PHYSICS = frozenset(
+    """
+    KHR_collision_shapes KHR_implicit_shapes KHR_physics_rigid_bodies OMI_physics_body OMI_physics_shape
+    """.split()  # noqa: SIM905
+)
 
 
 def unknown_required(json: Json) -> list[str]:

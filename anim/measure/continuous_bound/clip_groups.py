@@ -101,7 +101,8 @@ def _side_by_side(prover: Prover, group: Sequence[ScenePair]) -> tuple[Prover, C
     before, after = (_as_one(clips, offsets) for clips in zip(*((e.before, e.after) for e in group), strict=True))
     scene = _join(scenes, offsets)
     whole = WholeScene.of(scene, ruler.diagonal)
-    return Prover(ErrorMetric(scene, clips=(before, after), whole=whole)), before, after
+    whole = whole._replace(num_vertices=max(whole.num_vertices, ruler.whole.num_vertices))
+    return Prover(ErrorMetric(scene, shell=ruler.shell, clips=(before, after), whole=whole)), before, after
 
 
 def _as_one(clips: Sequence[Clip], offsets: Sequence[int]) -> Clip:

@@ -78,6 +78,11 @@ class CombinedGroups:
         part, first = self._part(found.group)
         return part.vertex(found._replace(group=found.group - first))
 
+    def is_shell(self, group: int) -> bool:
+        """Return whether a group's points are around nodes that move no vertex."""
+        part, first = self._part(group)
+        return part.is_shell(group - first)
+
     def name_of(self, found: MaxDisplacement) -> str:
         """Return the name of the surface of what was found; empty for shells."""
         part, first = self._part(found.group)

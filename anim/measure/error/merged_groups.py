@@ -48,6 +48,11 @@ class MergedGroups(SkinnedGroups):
         point = super().vertex(found)
         return int(point - self._firsts[self._part(point)]) if self.has_vertices and point >= 0 else -1
 
+    def is_shell(self, group: int) -> bool:
+        """Return whether the points are around nodes that move no vertex."""
+        del group
+        return not self.has_vertices
+
     def name_of(self, found: MaxDisplacement) -> str:
         """Return the name of the mesh, or of a shell's node; of the first one if only a bound was evaluated."""
         return self._called(self._part(max(super().vertex(found), 0)))

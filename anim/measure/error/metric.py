@@ -46,6 +46,7 @@ class MotionError(NamedTuple):
     contribution. times: number of samples.
     max_pointer_error: largest error of a track that moves no node, as a fraction of its range.
     vertex: its index in the mesh, −1 for a shell or if the error is too small to be searched.
+    is_around_node: whether it is that of a shell beside vertices; then `place` is the node, which moves none.
     """
 
     max_error: float
@@ -56,6 +57,7 @@ class MotionError(NamedTuple):
     max_pointer_error: float = 0.0
     pointer: str = ""
     vertex: int = -1
+    is_around_node: bool = False
 
 
 class Block(NamedTuple):
@@ -104,8 +106,8 @@ class ErrorMetric:
         whole: WholeScene | None = None,
     ) -> None:
         self.scene, self.other = scene, other or scene
-        self._shell, self._whole = shell, whole or WholeScene.of(scene, diagonal(scene))
-        self.diagonal = self._whole.diagonal
+        self.shell, self.whole = shell, whole or WholeScene.of(scene, diagonal(scene))
+        self.diagonal = self.whole.diagonal
         found = surfaces(scene) if has_vertices(scene) else []
         self.pairs: Correspondence = match_scenes(scene, self.other, found)
         if shell is None and not found and (self.pairs.nodes < 0).any():
@@ -128,7 +130,7 @@ class ErrorMetric:
             if not self.pairs.surfaces:
                 self.num_static_points = points[..., 0].size - sum(len(g) for each in around for g in each.groups)
             self.parts += [*groups, *around]
-        self.num_static_points += self._whole.count_other_points(scene, points.shape[1])
+        self.num_static_points += self.whole.count_other_points(scene, points.shape[1])
         self.combined = combine_groups(self.parts)
         self._recent = RecentSamplers()
 
@@ -140,7 +142,7 @@ class ErrorMetric:
         if (found := self._divider.part((before, after))) is None:
             return None
         clips = found.into(before), found.into(after)
-        return ErrorMetric(found.scene, shell=self._shell, clips=clips, whole=self._whole), *clips
+        return ErrorMetric(found.scene, shell=self.shell, clips=clips, whole=self.whole), *clips
 
     @cached_property
     def _divider(self) -> SceneDivider:
@@ -201,7 +203,7 @@ class ErrorMetric:
 
         limits: arrays to write the limits of groups into, or None.
         """
-        size, frame, place, joint, vertex, worst = 0.0, 0, "", -1, -1, players[0]
+        size, frame, place, joint, vertex, worst, around = 0.0, 0, "", -1, -1, players[0], False
         first, only = 0, None
         for block in self._blocks_of_players(before, after, times, players):
             count = len(block.times) // len(players)
@@ -220,13 +222,15 @@ class ErrorMetric:
                     frame = first + found.frame % count
                     joint = part.node(field.joint(found.group, found.frame, found.vertex))
                     place = part.name_of(found) or self.called(joint)
+                    around = self.whole.num_vertices > 0 and part.is_shell(found.group)
             first += count
         time = float(times[frame]) if len(times) else 0.0
         old, new = (
             resolve_weight_pointers(s.skeleton, clip) for s, clip in ((self.scene, before), (self.other, after))
         )
         fraction, pointer = pointer_error(old, new, times)
-        return MotionError(size, time, place, self.called(joint), len(times), fraction, pointer, vertex), worst, only
+        called = self.called(joint)
+        return MotionError(size, time, place, called, len(times), fraction, pointer, vertex, around), worst, only
 
     def _blocks_of_players(self, before: Clip, after: Clip, times: Floats, players: Sequence[str]) -> Iterator[Block]:
         """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""

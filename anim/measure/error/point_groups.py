@@ -79,6 +79,10 @@ class PointGroups(Protocol):
         """Return the index in the mesh of the vertex that was found, −1 for none."""
         ...
 
+    def is_shell(self, group: int) -> bool:
+        """Return whether a group's points are around nodes that move no vertex."""
+        ...
+
 
 class SkinnedGroups:
     """A surface with vertices grouped by their main joint, and boxes around joints' vertices.
@@ -153,6 +157,11 @@ class SkinnedGroups:
     def vertex(self, found: MaxDisplacement) -> int:
         """Return the index in the mesh of the vertex that was found, −1 if only a bound was evaluated."""
         return int(self.groups[found.group][found.vertex]) if found.vertex >= 0 else -1
+
+    def is_shell(self, group: int) -> bool:
+        """Return False: these are vertices."""
+        del group
+        return False
 
     def _influenced(self) -> tuple[float, Ints, Ints]:
         """The largest sum of skin weights, the joints with influence (J,), and those of vertices (V, I) into them."""

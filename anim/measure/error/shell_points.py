@@ -64,6 +64,11 @@ class ShellPoints:
         """Return the index of the point that was found, −1 of a shell: its points are no vertices."""
         return found.vertex if self.has_vertices else -1
 
+    def is_shell(self, group: int) -> bool:
+        """Return whether the points are around nodes that move no vertex: all or none."""
+        del group
+        return not self.has_vertices
+
 
 def nodes_without_vertices(skeleton: Skeleton, surfaces: Sequence[Surface]) -> Bools:
     """Return the mask (N,) of nodes that influence no vertex, and none of whose descendants does.

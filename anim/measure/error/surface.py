@@ -13,7 +13,7 @@ from anim.maths import matrix
 from anim.model import MeshInstance, Scene
 from anim.sampling import rest_world
 
-SHELL = 0.01  # half the edge of the cube around a node without vertices, as a fraction of the scene's reference length
+SHELL = 0.01  # of the reference length: half the edge of a cube around a node without vertices, usual radius of a shell
 MIN_EXTENT = 1e-6  # m; a smaller diagonal says nothing about the size of what is seen from, or hangs on, its nodes
 
 NUM_CORNERS = 8  # of such a cube

@@ -93,8 +93,8 @@ def command(
         str | None,
         typer.Option(
             "--max-stretch",
-            metavar="PERCENT",
-            help="Halve the step until no edge is stretched by more at any frame; else exit 6.",
+            metavar="FRACTION",
+            help="Halve the step until no edge is stretched by more at any frame, such as 5%; else exit 6.",
         ),
     ] = None,
     tethers: Annotated[

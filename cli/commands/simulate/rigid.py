@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from anim.gltf.document import Document
+from anim.gltf.validation.extensions import PHYSICS
 from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
@@ -118,7 +119,7 @@ def command(
             note_own_clip(name, driver, reporter)
         return add_rigid_motion(document, run, name, merged), run.report, _summary(run.report)
 
-    simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run)
+    simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run, uses=PHYSICS)
 
 
 def _nodes(scene: Scene, globs: list[str] | None) -> tuple[int, ...]:

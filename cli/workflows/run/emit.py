@@ -34,7 +34,7 @@ def shell_script(jobs: Sequence[Job]) -> str:
     lines.append(f"mkdir -p -- {shlex.join(folders)}")
     for job in jobs:
         _check_images(job)
-        lines.append(_pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output))))
+        lines.append(_pipeline(job.steps, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output))))
     return "\n".join(lines) + "\n"
 
 
@@ -52,19 +52,18 @@ def makefile(jobs: Sequence[Job]) -> str:
 
 def ninja_file(jobs: Sequence[Job]) -> str:
     """Return rules and builds for ninja, to be used in the folder of the settings."""
-    rules: dict[tuple[tuple[Step, ...], bool, str, str], str] = {}
+    rules: dict[tuple[tuple[Step, ...], str, str], str] = {}
     builds = []
     for job in jobs:
         _check_images(job)
-        key = (job.steps, _is_text(job), _variable_in_ninja("$in", job.input), _variable_in_ninja("$out", job.output))
+        key = (job.steps, _variable_in_ninja("$in", job.input), _variable_in_ninja("$out", job.output))
         name = rules.setdefault(key, f"recipe{len(rules) + 1}")
         output, *inputs = (_in_ninja(each) for each in (job.output, job.input, *_other_inputs(job)))
         implicit = f" | {' '.join(inputs[1:])}" if inputs[1:] else ""
         builds.append(f"build {output}: {name} {inputs[0]}{implicit}\n")
     texts = []
-    for (steps, is_text, input, output), name in rules.items():
-        job = Job(jobs[0].folder, "", "x.gltf" if is_text else "x.glb", steps)
-        command = _pipeline(job, input, output, escape=_one_line)
+    for (steps, input, output), name in rules.items():
+        command = _pipeline(steps, input, output, escape=_one_line)
         texts.append(f"rule {name}\n  command = {command}\n  description = $out\n")
     return "\n".join([HEADER, *texts, *builds])
 
@@ -85,9 +84,8 @@ def _open_input(job: Job) -> None:
             raise error.at(job.input, ": ") from None
 
 
-def _pipeline(job: Job, input: str, output: str, escape: Escape = str) -> str:
+def _pipeline(steps: Sequence[Step], input: str, output: str, escape: Escape = str) -> str:
     """The steps as commands with pipes between them. input, output: as the script has them."""
-    steps = [*job.steps, *([Step(("convert",), ())] if _is_text(job) else [])]
     last = len(steps) - 1
     lines = [
         " ".join(
@@ -104,11 +102,6 @@ def _pipeline(job: Job, input: str, output: str, escape: Escape = str) -> str:
     return " | ".join(lines)
 
 
-def _is_text(job: Job) -> bool:
-    """Return whether the output is text: a run converts the last step's GLB to it."""
-    return job.output.lower().endswith(".gltf")
-
-
 def _other_inputs(job: Job) -> Iterator[str]:
     """Yield the other files that a job reads: of its steps' options, and buffers of the input."""
     for step in job.steps:
@@ -121,7 +114,7 @@ def _other_inputs(job: Job) -> Iterator[str]:
 def _check_images(job: Job) -> None:
     """Raise UsageError for an input with external images, which no pipe carries."""
     first = job.steps[0]
-    if first.command[0] not in EDITING or EMBED in first.options or (len(job.steps) == 1 and not _is_text(job)):
+    if first.command[0] not in EDITING or EMBED in first.options or len(job.steps) == 1:
         return
     document = open_file(str(job.folder / job.input)).document
     outside = [external_uri(image) for image in json_array(document.json, "images") if external_uri(image)]
@@ -136,9 +129,9 @@ def _make_commands(job: Job) -> list[str]:
     """Lines of a rule, with automatic variables if the names need no escapes."""
     if any(re.search("^-|[ '#:]", name) for name in (job.input, job.output)):
         folder = shlex.quote(PurePosixPath(job.output).parent.as_posix())
-        command = _pipeline(job, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output)))
+        command = _pipeline(job.steps, shlex.quote(argument_of(job.input)), shlex.quote(argument_of(job.output)))
         return [_one_line(each) for each in (f"@mkdir -p -- {folder}", command)]
-    return ["@mkdir -p '$(@D)'", _pipeline(job, "'$<'", "'$@'", escape=_one_line)]
+    return ["@mkdir -p '$(@D)'", _pipeline(job.steps, "'$<'", "'$@'", escape=_one_line)]
 
 
 def _one_line(command: str) -> str:

@@ -16,9 +16,10 @@ import numpy as np
 from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import AnimError, UnsupportedError, not_written
-from anim.gltf.document import json_array
+from anim.gltf.document import Document, json_array
 from anim.gltf.io import container, images
 from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
+from anim.gltf.io.text_form import restore_text_form
 from cli import errors, main
 from cli.io.documents import PIPE
 from cli.reports import image_notes
@@ -154,6 +155,8 @@ def write_output(job: Job, product: Bytes) -> int:
         raise not_written(str(path.parent), error) from None
     folder = (job.folder / job.input).parent
     source = open_bytes(product, job.output)._replace(folder=folder)
+    if is_text(job.output):
+        source = source._replace(document=_as_the_last_step_writes(job, source.document))
     try:
         size = write_file(source.document, str(path), source, unchanged=product)
     except AnimError as error:
@@ -163,6 +166,15 @@ def write_output(job: Job, product: Bytes) -> int:
         for line in image_notes.notes(source.document, folder, copied=True):
             Reporter().info(line)
     return size
+
+
+def _as_the_last_step_writes(job: Job, document: Document) -> Document:
+    """The document of a .gltf as the last step's command writes it to a file; by a pipe it gets a GLB."""
+    if len(job.steps) == 1 and is_text(job.input):
+        document = restore_text_form(document, open_file(str(job.folder / job.input)).document)
+    last = job.steps[-1]
+    is_embedding = last.command == ("convert",) and "--embed" in last.options
+    return container.embed_buffers(document) if is_embedding else document
 
 
 def stamp_companions(job: Job, product: Bytes, read: Iterable[str | Path]) -> dict[str, Stamp | None]:

@@ -36,8 +36,9 @@ export function zoomTo({ camera, controls }, scale, x, y) {
 }
 
 /** Look at the target from the "front", the "side" or "above", at the present distance. */
-export function lookFrom({ camera, controls }, name) {
+export function lookFrom({ camera, controls, front }, name) {
   const distance = camera.position.distanceTo(controls.target);
-  camera.position.set(...DIRECTIONS[name]).setLength(distance).add(controls.target);
+  const [x, y, z] = DIRECTIONS[name];
+  camera.position.set(x * front, y, z * front).setLength(distance).add(controls.target);
   controls.update();
 }

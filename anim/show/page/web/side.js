@@ -13,7 +13,9 @@ export class Side {
     this.root = gltf.scene;
     this.scene = new Scene();
     this.overlay = new Group(); // skeleton, onion skins: drawn above the model
-    this.scene.add(this.root, this.overlay, ...lights());
+    const { VRM, VRMC_vrm } = gltf.parser.json.extensions ?? {};
+    this.front = VRM && !VRMC_vrm ? -1 : 1; // figures look along -Z in VRM 0.x, along +Z else
+    this.scene.add(this.root, this.overlay, ...lights(this.front));
     const meshes = [];
     this.root.traverse((object) => {
       object.name ||= object.uuid; // which clones, onion skins, find their tracks by
@@ -57,11 +59,11 @@ export class Side {
   }
 }
 
-function lights() {
+function lights(front) {
   const sun = new DirectionalLight(0xffffff, 2);
   const back = new DirectionalLight(0xbfd4ff, 0.7);
-  sun.position.set(1, 2, 1.5);
-  back.position.set(-1.5, 0.6, -1.5);
+  sun.position.set(front, 2, 1.5 * front);
+  back.position.set(-1.5 * front, 0.6, -1.5 * front);
   return [new HemisphereLight(0xffffff, 0x8a8478, 1.9), sun, back];
 }
 

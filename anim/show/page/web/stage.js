@@ -16,7 +16,7 @@ const CAMERA_DIGITS = 3; // of the camera in the address, below the radius of th
 const MAX_DECIMALS = 12;
 const MAX_ZOOM = 50; // of the wheel, from the camera that frames everything
 const FLOOR_RADII = 6; // radius of the floor, in radii of the model
-const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from the front, a little from the left and above
+const DIRECTION = new Vector3(0.55, 0.28, 0.85); // of the camera: from a front at +Z, a little from the left and above
 
 export class Stage {
   constructor(canvas, sides) {
@@ -40,6 +40,11 @@ export class Stage {
     this.framed = ""; // camera that frames everything, as text, and what it frames
   }
 
+  /** 1 if the figures look along +Z, -1 along -Z; of two files those of the first. */
+  get front() {
+    return this.sides[0].front;
+  }
+
   get shown() {
     if (state.side === "both" || this.sides.length < 2) return this.sides;
     return [this.sides[state.side === "a" ? 0 : 1]];
@@ -55,7 +60,7 @@ export class Stage {
     const distance = this.#distance(points, center);
     this.camera.near = distance / 100;
     this.camera.far = distance * 50;
-    this.camera.position.copy(DIRECTION).setLength(distance).add(center);
+    this.camera.position.copy(this.#direction).setLength(distance).add(center);
     this.controls.target.copy(center);
     this.controls.minDistance = distance / MAX_ZOOM;
     this.controls.maxDistance = distance * 10;
@@ -88,6 +93,11 @@ export class Stage {
   /** Position and target of the camera for the address: "x,y,z,x,y,z"; "" while it frames the clip and side shown. */
   get cameraText() {
     return `${this.#camera} ${this.#subject}` === this.framed ? "" : this.#camera;
+  }
+
+  /** From the target to the camera that frames everything. */
+  get #direction() {
+    return DIRECTION.clone().multiply(new Vector3(this.front, 1, this.front));
   }
 
   get #subject() {
@@ -136,7 +146,7 @@ export class Stage {
     const { clientWidth, clientHeight } = this.renderer.domElement.parentNode;
     const aspect = clientWidth / clientHeight / this.shown.length;
     const tangent = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
-    const toCamera = DIRECTION.clone().normalize();
+    const toCamera = this.#direction.normalize();
     const right = new Vector3(0, 1, 0).cross(toCamera).normalize();
     const up = toCamera.clone().cross(right);
     const spot = new Vector3();
