@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Floats
-from anim.errors import RangeError, check_number
+from anim.errors import RangeError, UnsupportedError, check_number
 from anim.model import Clip, Interpolation, TimeAxis, Track
 from anim.operations.selection import track_indices
 from anim.sampling.times import jump_time_after, separate_float32
@@ -38,7 +38,7 @@ def retime(
     speed: > 0; 0.25 takes four times as long. duration: seconds from first to last key, > 0. Not both.
     offset: seconds added to the clip's start, which otherwise is unchanged; the new start must not be below 0. A new
     start within half a millisecond of 0 becomes 0.
-    Raises RangeError for values out of range.
+    Raises RangeError for values out of range, UnsupportedError if too many keys get the same time.
     (keys 0, 1 s; speed 0.25) → keys 0, 4 s
     """
     chosen = track_indices(clip, tracks)
@@ -64,7 +64,7 @@ def retime(
 
 def scale_time(track: Track, start: float, factor: float) -> Track:
     """Return the track with its times scaled by `factor` about `start`."""
-    times = start + (track.times - start) * factor
+    times = _keep_apart(start + (track.times - start) * factor)
     if track.in_tangents is None or track.out_tangents is None:
         return track.with_keys(times, track.values)
     return track.with_keys(times, track.values, track.in_tangents / factor, track.out_tangents / factor)
@@ -72,7 +72,7 @@ def scale_time(track: Track, start: float, factor: float) -> Track:
 
 def shift_time(track: Track, offset: float) -> Track:
     """Return the track shifted by `offset` seconds."""
-    return replace(track, time_axis=TimeAxis(np.maximum(track.times + offset, 0.0)))
+    return replace(track, time_axis=TimeAxis(_keep_apart(np.maximum(track.times + offset, 0.0))))
 
 
 def reverse_track(track: Track, start: float, end: float) -> Track:
@@ -81,7 +81,7 @@ def reverse_track(track: Track, start: float, end: float) -> Track:
     STEP keeps its value in each mirrored interval; its last value comes first, for the duration of a jump if the last
     key is at `end`.
     """
-    times = start + end - track.times[::-1]
+    times = _keep_apart(start + end - track.times[::-1])
     if track.interpolation is Interpolation.STEP:
         return _reverse_step(track, times, start)
     values = track.values[::-1]
@@ -111,6 +111,23 @@ def _separate_keys(track: Track) -> Track:
     """The track with jumps long enough for float32 at their new times."""
     times = separate_float32(track.times)
     return track if times is track.times else replace(track, time_axis=TimeAxis(times))
+
+
+def _keep_apart(times: Floats) -> Floats:
+    """Times that increase: those that rounding makes equal, such as 0 and 1e-45 s moved to 3 s, are a jump.
+
+    Raises UnsupportedError for more of them than a jump has.
+    """
+    if (np.diff(times) > 0).all():
+        return times
+    apart = separate_float32(times)
+    if not (steps := np.diff(apart) > 0).all():
+        k = int(np.argmin(steps))
+        raise UnsupportedError(
+            f"keys {k} and {k + 1} would fall together, at {apart[k]:.9g} s",
+            help="resample the clip: it has fewer keys",
+        )
+    return apart
 
 
 def _check_end(clip: Clip, end: float) -> None:
@@ -162,7 +179,7 @@ def _reverse_step(track: Track, times: Floats, start: float) -> Track:
         shown = start if times[0] > jump_time_after(start) else float(times[0])
         times = np.concatenate(([shown, max(float(times[0]), jump_time_after(shown))], times[1:]))
         values = np.concatenate((track.values[-1:], values))
-    return track.with_keys(times, values)
+    return track.with_keys(_keep_apart(times), values)
 
 
 def _concatenate(track: Track, back: Track, *, drop_first: bool) -> Track:

@@ -12,6 +12,7 @@ from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Skeleton
 from anim.model.skeleton import nearest_at_or_above, node_mask
 from anim.simulation.rigid_bodies.description import Collider, Motion, PhysicsDescription, Shape, Vector
+from anim.simulation.rigid_bodies.extension_values import as_fault
 from anim.simulation.rigid_bodies.rigid_scene import (
     WORLD,
     BodyCollider,
@@ -36,7 +37,7 @@ def assemble(
 
     A node with a motion owns the colliders below it, down to the next such node. A collider without one is static, or
     animated if the clip moves its node or a parent. A motion whose own node the clip moves follows the clip.
-    world: world_from_node (N, 3, 4) at the start. Raises RangeError without any body that moves.
+    world: world_from_node (N, 3, 4) at the start. Raises RangeError without a body, or if the clip moves all of them.
     """
     if not description.motions:
         raise RangeError("there is no body to simulate", help="name some with `body`")
@@ -51,6 +52,11 @@ def assemble(
         kind = BodyKind.KINEMATIC if motion.kinematic else BodyKind.DYNAMIC
         kind = BodyKind.ANIMATED if node in tracked and motion.follows_clip else kind
         bodies.append(assembly.build_body(node, kind, motion, own))
+    if all(body.kind is BodyKind.ANIMATED for body in bodies):
+        raise RangeError(
+            "the clip moves every body: there is none to simulate",
+            help="name others with `body`, or with `clip` one that does not move them",
+        )
     for node in owned.get(-1, []):
         kind = BodyKind.ANIMATED if is_tracked[node] else BodyKind.STATIC
         bodies.append(assembly.build_body(node, kind, REST, [node]))
@@ -103,7 +109,7 @@ class _Assembly:
             try:
                 made += self._collider(each, frame)
             except AnimError as error:
-                raise error.at(self._skeleton.label(each)) from None
+                raise as_fault(error, self._skeleton.label(each)) from None
         reach = [float(np.linalg.norm(each.frame.position)) + self.extents.of(each.shape).reach for each in made]
         spin = quaternion.rotate(frame.rotation, np.array(motion.angular_velocity))
         velocity: Floats = np.array(motion.linear_velocity)

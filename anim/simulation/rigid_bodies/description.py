@@ -136,7 +136,7 @@ class Collider:
 class JointLimit:
     """Range of the relative translation (m) along, or rotation (rad) about, 1 to 3 axes together.
 
-    With two or three axes the distance, or the angle, is limited. stiffness: None for a hard limit.
+    With two or three axes the distance, or the angle, is limited. stiffness: None for a hard limit. Raises RangeError.
     """
 
     angular: bool
@@ -150,6 +150,8 @@ class JointLimit:
         check_axes(self.axes)
         if self.min > self.max:
             raise RangeError(f"a joint's limits are {self.min:g} to {self.max:g} (expected min below max)")
+        check_positive("a joint's stiffness", self.stiffness or 0.0)
+        check_positive("a joint's damping", self.damping)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,12 +16,13 @@ from anim.sampling import rest_pose
 from anim.sampling.world import local_by_node
 from anim.simulation.rigid_bodies.description import Shape
 from anim.simulation.rigid_bodies.extension_values import read_item, read_number, read_numbers, read_object
-from anim.simulation.rigid_bodies.shapes import join_meshes, mesh_shape
+from anim.simulation.rigid_bodies.shapes import count_bytes, join_meshes, mesh_shape
 
 # Radius and height of capsules and cylinders that a file leaves out: KHR's, OMI's.
 KHR_DEFAULTS = {"capsule": (0.25, 0.5), "cylinder": (0.25, 0.5)}
 OMI_DEFAULTS = {"capsule": (0.5, 1.0), "cylinder": (0.5, 2.0)}
 MESH_KINDS = {"convex": "hull", "trimesh": "mesh", "mesh": "mesh"}
+NODE_BYTES = 1000  # of a node at or below a collider: its matrix, and arrays beside their numbers
 
 
 class ShapeReader:
@@ -32,7 +33,9 @@ class ShapeReader:
     ) -> None:
         self._document = document
         self._skeleton = skeleton
-        self._meshes = Meshes(document, Accessors(document))
+        accessors = Accessors(document)
+        self._meshes, self._budget = Meshes(document, accessors), accessors.budget
+        self._counted_bytes = 0
         self._shapes = shapes
         self._defaults = defaults
         self._local = local_by_node(skeleton, rest_pose(skeleton))[:, 0]
@@ -69,7 +72,11 @@ class ShapeReader:
         return self._of_meshes[key]
 
     def node_meshes(self, node: Any, kind: str) -> Shape:
-        """Return the "mesh" or "hull" of the meshes of a node and its descendants, in the node's space."""
+        """Return the "mesh" or "hull" of the meshes of a node and its descendants, in the node's space.
+
+        Raises UnsupportedError if the nodes of all such colliders together, which can be below each other, take more
+        than the limit of memory.
+        """
         read_item(json_array(self._document.json, "nodes"), node, "node")
         if (node, kind) not in self._of_nodes:
             found = self._collect(int(node))
@@ -86,15 +93,25 @@ class ShapeReader:
         waiting = [(root, np.eye(4)[:3])]
         while waiting:
             node, to_root = waiting.pop()
+            self._count(NODE_BYTES)
             json = nodes[node]
             if "mesh" in json:
                 if "skin" in json:
                     raise UnsupportedError(f"{self._skeleton.label(node)} is skinned: a collider's mesh must be rigid")
                 shape = self.mesh(json["mesh"], "mesh", json.get("weights"))
+                self._count(count_bytes(shape))
                 found.append(Shape("mesh", points=matrix.apply(to_root, shape.points), faces=shape.faces))
             children = reversed(json.get("children", ()))
             waiting += [(child, matrix.multiply(to_root, self._local[child])) for child in children]
         return found
+
+    def _count(self, size: int) -> None:
+        self._counted_bytes += size
+        self._budget.check(
+            self._counted_bytes,
+            "the meshes of all colliders' nodes and the nodes below them",
+            help="let each collider name its mesh, without those of other colliders below it, or raise `memory_limit`",
+        )
 
     def _round_shape(self, kind: str, values: dict[str, Any]) -> Shape:
         radius, height = self._defaults[kind]

@@ -162,7 +162,7 @@ class _Run:
         if self._limit is None:  # masses are known after the first step, whose contacts are those before it
             self._limit = _EnergyLimit(self._rigid, world)
             recorder.overlaps = [pair for pair in world.contacts() if pair[2] > 0]
-        states = np.array(world.states()).reshape(-1, 7)
+        states = world.states()
         if self._finder is not None:
             self._finder.update(index, states, (self._driver.bodies, driven[0] - world.center, driven[1]))
         if index % self._substeps == 0 or index == 1:

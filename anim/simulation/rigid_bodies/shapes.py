@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from anim.arrays import Floats
+from anim.memory import MemoryBudget
 from anim.model import Mesh
 from anim.simulation.rigid_bodies.description import Shape
 
 SCALE_TOLERANCE = 1e-4  # relative difference of scales that counts as none: float32 rounding
 SAME_SCALE = 1e-9  # relative difference of scales that is rounding of rotations
 CIRCLE_POINTS, ARC_POINTS = 32, 7
+POINT_BYTES, TRIANGLE_BYTES = 60, 250  # with their copies here, and in the engine's float32 and bounding volumes
 
 
 def mesh_shape(mesh: Mesh, kind: str, weights: Floats | None = None) -> Shape:
@@ -63,14 +65,24 @@ def scale_shape(shape: Shape, linear: Floats) -> Shape:
     return Shape(shape.kind, tuple((np.array(shape.size) * factors).tolist()), center=(x, y, z))
 
 
+def count_bytes(shape: Shape) -> int:
+    """Return the bytes that points and faces take, here and in the engine."""
+    return POINT_BYTES * len(shape.points) + TRIANGLE_BYTES * len(shape.faces)
+
+
 class ScaledShapes:
     """Shapes under scales: one object for one shape and scale, so that instances of a mesh share points and hull."""
 
     def __init__(self) -> None:
         self._made: dict[tuple[Shape, bytes], Shape] = {}
+        self._seen: set[Shape] = set()
+        self._copied_bytes = 0
 
     def scale(self, shape: Shape, linear: Floats) -> Shape:
-        """Return the shape under a scale (3, 3); of points, under one that differs by less than SAME_SCALE."""
+        """Return the shape under a scale (3, 3); of points, under one that differs by less than SAME_SCALE.
+
+        Raises UnsupportedError if the same points under many scales take more than the limit of memory.
+        """
         if shape.kind not in ("hull", "mesh"):
             return scale_shape(shape, linear)
         if np.abs(linear - np.eye(3)).max() < SAME_SCALE:
@@ -78,8 +90,19 @@ class ScaledShapes:
         size = float(f"{np.abs(linear).max():.9g}")
         key = shape, np.append(np.round(linear / size / SAME_SCALE) + 0.0, size).tobytes()  # no negative zeros
         if key not in self._made:
+            self._count(shape)
             self._made[key] = scale_shape(shape, linear)
         return self._made[key]
+
+    def _count(self, shape: Shape) -> None:
+        """Count a copy of a shape beside its first one, which is as large as the file's."""
+        self._copied_bytes += count_bytes(shape) if shape in self._seen else 0
+        self._seen.add(shape)
+        MemoryBudget(0).check(
+            self._copied_bytes,
+            "meshes of colliders under different scales",
+            help="choose boxes, or raise `memory_limit`",
+        )
 
 
 def surface_points(shape: Shape) -> Floats:

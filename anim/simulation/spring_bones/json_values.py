@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import ParamSpec, TypeVar
 
 from anim.errors import AnimError, FormatError, NotFoundError
@@ -54,6 +54,26 @@ def count_items(value: Json, key: str) -> int:
     """Return the length of an array that may be missing, or be something else that its own check reports."""
     items = value.get(key)
     return len(items) if isinstance(items, list) else 0
+
+
+class JointSprings:
+    """The spring of each joint that a file lists. nodes: the file's JSON.
+
+    Joints are added before their chains are built: a file can list one chain of a thousand joints a thousand times.
+    """
+
+    def __init__(self, nodes: Sequence[Json]) -> None:
+        self._nodes = nodes
+        self._springs: dict[int, str] = {}
+
+    def add(self, node: int, spring: str) -> None:
+        """Add a joint by its node. spring: its position in the JSON. Raises FormatError for a joint of two springs."""
+        if node in self._springs:
+            other, name = self._springs[node], self._nodes[node].get("name", "")
+            label = f"node {node} '{name}'" if name else f"node {node}"
+            words = f"a joint of {other} too" if other != spring else "a joint twice"
+            raise FormatError(f"{label} is {words} (expected one spring for each joint)", where=spring)
+        self._springs[node] = spring
 
 
 def locate(where: str, make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar
 
 from anim.errors import AnimError, NotFoundError
-from anim.gltf.document import Document
+from anim.gltf.document import Document, Json
 from anim.simulation.spring_bones import vrm0, vrm1
 from anim.simulation.spring_bones.chains import SpringBones
 from anim.simulation.spring_bones.colliders import Collider
 
-READERS = {vrm1.EXTENSION: vrm1.read, vrm0.EXTENSION: vrm0.read}
+T = TypeVar("T")
+SPRING_READERS = {vrm1.EXTENSION: vrm1.read, vrm0.EXTENSION: vrm0.read}
+COLLIDER_READERS = {vrm1.EXTENSION: vrm1.read_colliders, vrm0.EXTENSION: vrm0.read_colliders}
 
 
 def read_spring_bones(document: Document) -> SpringBones:
@@ -18,7 +21,7 @@ def read_spring_bones(document: Document) -> SpringBones:
 
     Raises NotFoundError if it states none, FormatError with the position in the JSON if they are invalid.
     """
-    for bones in _read_all(document):
+    for bones in _read_all(document, SPRING_READERS):
         if bones.chains:
             return bones
     raise NotFoundError(
@@ -28,16 +31,16 @@ def read_spring_bones(document: Document) -> SpringBones:
 
 
 def read_colliders(document: Document) -> tuple[Collider, ...]:
-    """Return the colliders of a file's spring bones, which may have no chains. Raises as `read_spring_bones`."""
-    for bones in _read_all(document):
-        if bones.colliders:
-            return bones.colliders
+    """Return the colliders of a file's spring bones, whose chains are left out. Raises as `read_spring_bones`."""
+    for colliders in _read_all(document, COLLIDER_READERS):
+        if colliders:
+            return colliders
     raise NotFoundError("the file has no colliders (neither VRMC_springBone nor VRM 0.x secondaryAnimation)")
 
 
-def _read_all(document: Document) -> Iterator[SpringBones]:
+def _read_all(document: Document, readers: Mapping[str, Callable[[Any, Json], T]]) -> Iterator[T]:
     extensions = document.json.get("extensions")
-    for name, read in READERS.items():
+    for name, read in readers.items():
         if isinstance(extensions, dict) and name in extensions:
             try:
                 yield read(extensions[name], document.json)

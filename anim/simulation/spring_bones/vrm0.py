@@ -7,15 +7,16 @@ Source: VRM 0.x schema ("stiffiness" is its spelling); For `vrm0` in VRMC_spring
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from anim.gltf.document import Json, json_array
-from anim.gltf.validation.rules import ObjectRule, at_least, check_property, index, list_of, number, text
+from anim.gltf.validation.rules import ObjectRule, WholeNumber, check_property, index, list_of, number, text
 from anim.simulation.spring_bones.chains import SpringBones, SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape, Vector
-from anim.simulation.spring_bones.json_values import count_items, locate
+from anim.simulation.spring_bones.json_values import JointSprings, count_items, locate
 
 EXTENSION = "VRM"
 DEFAULT_STIFFNESS, DEFAULT_DRAG, DEFAULT_HIT_RADIUS_M = 1.0, 0.4, 0.02  # UniVRM's
@@ -24,27 +25,48 @@ LAST_TAIL_M = 0.07  # of the last joint of a branch
 
 def read(extension: Any, json: Json) -> SpringBones:
     """Return the chains and colliders of the extension's JSON. json: that of the whole file."""
-    animation = extension.get("secondaryAnimation") if isinstance(extension, dict) else None
-    if not isinstance(animation, dict):
-        return SpringBones(())
+    colliders = read_colliders(extension, json)
+    animation = _animation(extension)
     nodes = json_array(json, "nodes")
-    _check(animation, len(nodes))
-    groups: list[tuple[int, ...]] = []
-    colliders: list[Collider] = []
-    for i, group in enumerate(animation.get("colliderGroups", [])):
-        first = len(colliders)
-        for each in group.get("colliders", []):
-            colliders.append(locate(f"colliderGroups[{i}]", _collider, each, group))
-        groups.append(tuple(range(first, len(colliders))))
-    chains = [
-        locate(f"boneGroups[{i}]", _chain, group, root, nodes, groups)
-        for i, group in enumerate(animation.get("boneGroups", []))
-        for root in group.get("bones", [])
-    ]
-    return SpringBones(tuple(chains), tuple(colliders))
+    ends = np.cumsum([0, *(len(group.get("colliders", [])) for group in animation.get("colliderGroups", []))]).tolist()
+    groups = [range(*each) for each in pairwise(ends)]
+    joints = JointSprings(nodes)
+    chains = []
+    for i, group in enumerate(animation.get("boneGroups", [])):
+        for k, root in enumerate(group.get("bones", [])):
+            below = _nodes_below(root, nodes, joints, f"boneGroups[{i}].bones[{k}]")
+            chains.append(locate(f"boneGroups[{i}]", _chain, group, below, nodes, groups))
+    return SpringBones(tuple(chains), colliders)
 
 
-def _chain(group: Json, root: int, nodes: list[Json], groups: list[tuple[int, ...]]) -> SpringChain:
+def read_colliders(extension: Any, json: Json) -> tuple[Collider, ...]:
+    """Return the colliders of the extension's JSON, all of whose values are checked. json: that of the whole file."""
+    animation = _animation(extension)
+    _check(animation, len(json_array(json, "nodes")))
+    return tuple(
+        locate(f"colliderGroups[{i}]", _collider, each, group)
+        for i, group in enumerate(animation.get("colliderGroups", []))
+        for each in group.get("colliders", [])
+    )
+
+
+def _animation(extension: Any) -> Json:
+    animation = extension.get("secondaryAnimation") if isinstance(extension, dict) else None
+    return animation if isinstance(animation, dict) else {}
+
+
+def _nodes_below(root: int, nodes: list[Json], joints: JointSprings, spring: str) -> list[int]:
+    """A node and all below it, depth first, as joints of a spring."""
+    found, waiting = [], [root]
+    while waiting:
+        node = waiting.pop()
+        joints.add(node, spring)
+        found.append(node)
+        waiting.extend(reversed(nodes[node].get("children", [])))
+    return found
+
+
+def _chain(group: Json, below: list[int], nodes: list[Json], groups: list[range]) -> SpringChain:
     direction, power = _vector(group.get("gravityDir", {"y": -1.0})), group.get("gravityPower", 0.0)
     parameters = SpringParameters(
         stiffness=group.get("stiffiness", DEFAULT_STIFFNESS),
@@ -53,16 +75,13 @@ def _chain(group: Json, root: int, nodes: list[Json], groups: list[tuple[int, ..
         hit_radius=group.get("hitRadius", DEFAULT_HIT_RADIUS_M),
     )
     joints: list[SpringJoint] = []
-    waiting = [root]
-    while waiting:
-        node = waiting.pop()
+    for node in below:
         children = nodes[node].get("children", [])
         tail = children[0] if children else None
         joints.append(SpringJoint(node, tail, parameters, (0.0, 0.0, 0.0) if children else _last_tail(nodes[node])))
-        waiting.extend(reversed(children))
-    colliders = dict.fromkeys(index for each in group.get("colliderGroups", []) for index in groups[each])
+    colliders = [index for each in dict.fromkeys(group.get("colliderGroups", [])) for index in groups[each]]
     center = group.get("center", -1)
-    name = group.get("comment", "") or nodes[root].get("name", "")
+    name = group.get("comment", "") or nodes[below[0]].get("name", "")
     return SpringChain(name, tuple(joints), tuple(colliders), center if center >= 0 else None)
 
 
@@ -92,7 +111,7 @@ def _check(animation: Json, num_nodes: int) -> None:
     bones = ObjectRule(
         {
             **dict.fromkeys(("stiffiness", "gravityPower", "dragForce", "hitRadius"), number),
-            "center": at_least(-1),
+            "center": WholeNumber(-1, num_nodes, f"expected -1 for none, or one of {num_nodes} nodes"),
             "gravityDir": vector,
             "comment": text,
             "bones": list_of(node),

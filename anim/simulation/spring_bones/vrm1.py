@@ -25,6 +25,7 @@ from anim.simulation.spring_bones.colliders import Collider
 from anim.simulation.spring_bones.json_values import (
     EXTENDED_SHAPES,
     PLAIN_SHAPES,
+    JointSprings,
     count_items,
     locate,
     one_of_shapes,
@@ -42,18 +43,21 @@ LIMIT_SHAPES: dict[str, Check] = {"cone": _ANGLE, "hinge": _ANGLE, "spherical": 
 
 def read(extension: Any, json: Json) -> SpringBones:
     """Return the chains and colliders of the extension's JSON. json: that of the whole file."""
-    nodes = index("nodes", len(json_array(json, "nodes")))
-    _check(extension, nodes)
-    colliders = tuple(
-        locate(f"colliders[{i}]", _collider, each) for i, each in enumerate(extension.get("colliders", []))
-    )
-    groups = [tuple(group["colliders"]) for group in extension.get("colliderGroups", [])]
-    chains = tuple(
-        locate(f"springs[{i}]", _chain, each, groups)
-        for i, each in enumerate(extension.get("springs", []))
-        if len(each["joints"]) > 1
-    )
-    return SpringBones(chains, colliders, tuple(_notes(extension)))
+    colliders = read_colliders(extension, json)
+    groups = [tuple(dict.fromkeys(group["colliders"])) for group in extension.get("colliderGroups", [])]
+    springs = [(f"springs[{i}]", each) for i, each in enumerate(extension.get("springs", []))]
+    joints = JointSprings(json_array(json, "nodes"))
+    for where, spring in springs:
+        for joint in spring["joints"][:-1]:  # the last one is only a tail
+            joints.add(joint["node"], where)
+    chains = [locate(where, _chain, each, groups) for where, each in springs if len(each["joints"]) > 1]
+    return SpringBones(tuple(chains), colliders, tuple(_notes(extension)))
+
+
+def read_colliders(extension: Any, json: Json) -> tuple[Collider, ...]:
+    """Return the colliders of the extension's JSON, all of whose values are checked. json: that of the whole file."""
+    _check(extension, index("nodes", len(json_array(json, "nodes"))))
+    return tuple(locate(f"colliders[{i}]", _collider, each) for i, each in enumerate(extension.get("colliders", [])))
 
 
 def _chain(spring: Json, groups: list[tuple[int, ...]]) -> SpringChain:
@@ -66,7 +70,8 @@ def _chain(spring: Json, groups: list[tuple[int, ...]]) -> SpringChain:
         )
         for i, (one, other) in enumerate(pairwise(spring["joints"]))
     )
-    colliders = dict.fromkeys(index for group in spring.get("colliderGroups", []) for index in groups[group])
+    own = dict.fromkeys(spring.get("colliderGroups", []))
+    colliders = dict.fromkeys(index for group in own for index in groups[group])
     return SpringChain(spring.get("name", ""), joints, tuple(colliders), spring.get("center"))
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from anim.arrays import Floats
 from anim.curves.easing.table import parse
-from anim.errors import RangeError
+from anim.errors import RangeError, UnsupportedError
 from anim.model import Clip, TimeAxis, Track
 from anim.operations.retime import retime
 from anim.operations.time_warp import warp
@@ -172,6 +173,25 @@ def test_a_jump_stays_one_where_it_gets_later(name: str) -> None:
     for options in ({"reverse": True}, {"offset": 100.0}):
         new = changed(early, **options)
         assert (np.diff(new.times.astype(np.float32)) > 0).all()
+
+
+@pytest.mark.parametrize("options", [{"reverse": True}, {"ping_pong": True}, {"offset": 1.0}, {"speed": 0.5}])
+@pytest.mark.parametrize("interpolation", ["LINEAR", "STEP"])
+def test_keys_near_0_that_rounding_brings_together_stay_a_jump(options: dict[str, Any], interpolation: str) -> None:
+    values = np.outer([1.0, 2, 3, 4, 5], np.ones(3))
+    track = Track(0, "translation", interpolation, np.array([0, 1e-45, 1e-38, 1, 3]), values)
+    (new,) = retime(Clip("", (track,)), **options).tracks
+    stored = new.times.astype(np.float32)
+    assert (np.diff(stored) > 0).all()
+    assert new.values[:, 0].tolist()[:2] == ([5, 4] if "reverse" in options else [1, 2])
+    assert set(new.values[:, 0]) == {1, 2, 3, 4, 5}
+
+
+def test_more_keys_than_a_jump_has_are_refused() -> None:
+    track = Track(0, "translation", "LINEAR", np.array([*(1e-45 * np.arange(1, 90)), 3.0]), np.ones((90, 3)))
+    with pytest.raises(UnsupportedError, match=r"keys 1 and 2 would fall together, at 3 s") as caught:
+        retime(Clip("", (track,)), reverse=True)
+    assert "resample" in caught.value.help
 
 
 def test_keys_that_no_float32_time_tells_apart_are_left_to_the_writer() -> None:

@@ -86,12 +86,13 @@ class RapierWorld:
             isometry(Frame(self._units * position - self._center, rotation))
         )
 
-    def states(self) -> list[tuple[float, ...]]:
-        """Return position and quaternion xyzw of the moving bodies: 7 numbers each, relative to `center`."""
+    def states(self) -> Floats:
+        """Return position and quaternion xyzw (M, 7) of the moving bodies, relative to `center`."""
         states = [(*body.translation.to_tuple(), *body.rotation.to_tuple()) for body in self._read]
-        if self._units == 1.0:  # nearly always, and read in every step
-            return states
-        return [(x / self._units, y / self._units, z / self._units, *rotation) for x, y, z, *rotation in states]
+        found = np.array(states, np.float64).reshape(-1, 7)
+        if self._units != 1.0:
+            found[:, :3] /= self._units
+        return found
 
     @property
     def center(self) -> Floats:

@@ -9,6 +9,7 @@ import pytest
 
 from anim.errors import FormatError, UnsupportedError
 from anim.maths import quaternion
+from anim.memory import memory_limit
 from anim.simulation.rigid_bodies.description import Shape
 from anim.simulation.rigid_bodies.rapier import shapes
 from anim.simulation.rigid_bodies.rapier.shapes import ShapeBuilder
@@ -89,3 +90,14 @@ def test_scales_that_differ_by_rounding_give_one_shape() -> None:
     assert made.scale(shape, -0.7 * np.eye(3)) is not first
     assert made.scale(Shape("hull", points=CORNERS), 0.7 * np.eye(3)) is not first
     assert made.scale(shape, np.eye(3) + 1e-16) is shape
+
+
+def test_many_scales_of_a_mesh_are_counted_before_they_are_made() -> None:
+    made, shape = ScaledShapes(), mesh(CORNERS, [[0, 1, 2]])
+    with memory_limit(4000):
+        for _ in range(20):
+            made.scale(shape, 2 * np.eye(3))
+        for scale in range(3, 11):
+            made.scale(shape, scale * np.eye(3))
+        with pytest.raises(UnsupportedError, match=r"under different scales would take 4\.41e-06 GB"):
+            made.scale(shape, 11 * np.eye(3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 from typing import Any
@@ -9,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from anim.errors import AnimError
+from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Document
 from anim.gltf.io import container
 from anim.gltf.reading import reader
+from anim.memory import memory_limit
 from anim.simulation.rigid_bodies.description import CollisionFilter, PhysicsDescription, combine
 from anim.simulation.rigid_bodies.shapes import scale_shape
 from anim.simulation.rigid_bodies.simulate import read_description
@@ -202,6 +204,8 @@ def test_a_faulty_description_is_refused_with_its_node(physics: dict[str, Any], 
         ([{"linearAxes": [0], "min": 2, "max": 1}], [], "min below max"),
         ([{"linearAxes": [3], "max": 1}], [], "axes [3]"),
         ([{"max": 1}], [], "linearAxes and angularAxes"),
+        ([{"linearAxes": [0], "stiffness": -5}], [], "node 0, KHR_physics_rigid_bodies: a joint's stiffness is -5"),
+        ([{"linearAxes": [0], "damping": -5}], [], "node 0, KHR_physics_rigid_bodies: a joint's damping is -5"),
         ([], [{"type": "linear", "mode": "force"}], "axis None"),
         ([], [{"type": "round", "mode": "force", "axis": 0}], "'round'"),
         ([], [{"type": "linear", "mode": "force", "axis": 0, "stiffness": -1}], "stiffness is -1"),
@@ -210,8 +214,39 @@ def test_a_faulty_description_is_refused_with_its_node(physics: dict[str, Any], 
 def test_a_faulty_joint_is_refused(limits: list[Any], drives: list[Any], words: str) -> None:
     joint = {"connectedNode": 1, "joint": 0}
     made = document([node(joint=joint), node(motion={})], [], physicsJoints=[{"limits": limits, "drives": drives}])
-    with pytest.raises(AnimError, match=words.replace("[", r"\[")):
+    with pytest.raises(FormatError, match=words.replace("[", r"\[")):
         described(made)
+
+
+@needs_rapier
+def test_a_shape_that_a_scale_makes_too_large_is_a_fault_of_the_file() -> None:
+    large = node(motion={}, collider=collider(0)) | {"scale": [1e6, 1, 1]}
+    with pytest.raises(FormatError, match=r"node 0: a box has size \[1000000.0, 1.0, 1.0\] \(limit 100000 m\)"):
+        simulate(document([large], [{"type": "box"}]))
+
+
+@pytest.mark.parametrize("has_meshes", [False, True])
+def test_colliders_of_nodes_below_each_other_are_counted_before_they_are_joined(*, has_meshes: bool) -> None:
+    """Of a chain of 60 nodes, 1830 meshes."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32).tobytes()
+    nodes: list[dict[str, Any]] = [
+        {"children": [i + 1], "extensions": {"KHR_physics_rigid_bodies": {"collider": {"geometry": {"node": i}}}}}
+        for i in range(60)
+    ]
+    nodes = [{**each, "mesh": 0} if has_meshes else each for each in nodes]
+    chain = {
+        "buffers": [
+            {"byteLength": 36, "uri": "data:application/octet-stream;base64," + base64.b64encode(corners).decode()}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [*nodes, {"mesh": 0}],
+    }
+    assert len(read(chain).colliders[0].shape.faces) == (61 if has_meshes else 1)
+    with memory_limit(1_500_000), pytest.raises(UnsupportedError, match="the meshes of all colliders' nodes") as caught:
+        read(chain)
+    assert "node " in caught.value.where
 
 
 @needs_rapier

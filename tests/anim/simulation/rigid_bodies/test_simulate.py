@@ -234,6 +234,17 @@ def test_a_document_without_bodies_is_refused() -> None:
         simulate(document([node(collider=collider(0))], BALL))
 
 
+@pytest.mark.parametrize("loop", [False, True])
+@pytest.mark.parametrize("kind", ["dynamic", "kinematic"])
+def test_a_clip_that_moves_every_body_leaves_none_to_simulate(kind: str, *, loop: bool) -> None:
+    made = document([node(motion={"isKinematic": kind == "kinematic"}, collider=collider(0))], BALL)
+    scene = reader.scene(made)
+    clip = Clip("ride", (Track(0, "translation", Interpolation.LINEAR, TimeAxis([0, 1]), [[0, 0, 0], [1, 0, 0]]),))
+    with pytest.raises(RangeError, match="the clip moves every body") as caught:
+        simulate_rigid_bodies(scene, clip, read_description(made, scene.skeleton), RigidOptions(loop=loop))
+    assert "`body`" in caught.value.help
+
+
 def test_a_duration_of_0_writes_the_start() -> None:
     run = simulate(document([node((0, 1, 0), **FALLING)], BALL), duration=0.0)
     np.testing.assert_allclose(path(run, 0), [[0, 1, 0]], atol=1e-6)

@@ -19,7 +19,7 @@ from anim.simulation.spring_bones.angle_limits import AngleLimit, LimitShape
 from anim.simulation.spring_bones.chains import SpringBones, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import Collider, ColliderShape
 from anim.simulation.spring_bones.json_reader import read_spring_file
-from anim.simulation.spring_bones.read import read_spring_bones
+from anim.simulation.spring_bones.read import read_colliders, read_spring_bones
 from tests.anim.simulation.spring_bones.test_chain_globs import rig
 from tests.files import opened_fixture, opened_path
 
@@ -176,7 +176,8 @@ def test_every_node_below_a_bone_is_a_joint() -> None:
         ({"bones": [5]}, "boneGroups[0].bones[0]: is 5 (the file has 3 nodes)"),
         ({"dragForce": -1}, "boneGroups[0]: drag is -1"),
         ({"center": 1.5}, "boneGroups[0].center: is 1.5 (expected a whole number)"),
-        ({"center": -2}, "boneGroups[0].center: is -2 (expected -1 or more)"),
+        ({"center": -2}, "boneGroups[0].center: is -2 (expected -1 for none, or one of 3 nodes)"),
+        ({"center": 3}, "boneGroups[0].center: is 3 (expected -1 for none, or one of 3 nodes)"),
         ({"colliderGroups": [0]}, "colliderGroups[0]: is 0 (the file has 0 collider groups)"),
     ],
 )
@@ -184,6 +185,55 @@ def test_an_invalid_vrm_0_file_is_refused(group: dict[str, Any], words: str) -> 
     with pytest.raises(FormatError) as caught:
         vrm0(**group)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "extension", "words"),
+    [
+        (
+            "VRM",
+            {"secondaryAnimation": {"boneGroups": [{"bones": [1]}, {"bones": [0] * 1000}]}},
+            r"VRM.boneGroups\[1\].bones\[0\]: node 1 'b' is a joint of boneGroups\[0\].bones\[0\] too",
+        ),
+        (
+            SPRINGS,
+            {"specVersion": "1.0", "springs": [{"joints": [{"node": 0}, {"node": 1}, {"node": 2}]}] * 1000},
+            r"springs\[1\]: node 0 'a' is a joint of springs\[0\] too",
+        ),
+        (
+            SPRINGS,
+            {"specVersion": "1.0", "springs": [{"joints": [{"node": 0}, {"node": 0}, {"node": 1}]}]},
+            r"springs\[0\]: node 0 'a' is a joint twice",
+        ),
+    ],
+)
+def test_a_joint_of_two_springs_is_refused_before_chains_are_built(
+    name: str, extension: dict[str, Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built: list[SpringJoint] = []
+    monkeypatch.setattr(SpringJoint, "__post_init__", lambda joint: built.append(joint))
+    with pytest.raises(FormatError, match=words):
+        stated(name, extension)
+    assert len(built) <= 3
+
+
+def test_colliders_are_read_without_chains() -> None:
+    springs = [{"joints": [{"node": 0}, {"node": 1}]}] * 2
+    sphere = {"node": 2, "shape": {"sphere": {"radius": 0.5}}}
+    extension = {"specVersion": "1.0", "springs": springs, "colliders": [sphere]}
+    content = {"asset": {"version": "2.0"}, "nodes": NODES, "extensions": {SPRINGS: extension}}
+    assert [each.radius for each in read_colliders(Document(content, ()))] == [0.5]
+
+
+def test_groups_of_colliders_named_twice_count_once() -> None:
+    sphere = {"node": 2, "shape": {"sphere": {}}}
+    spring = {"joints": [{"node": 0}, {"node": 1}], "colliderGroups": [1, 0] * 10**4}
+    groups = [{"colliders": [1, 0] * 10**4}, {"colliders": [1]}]
+    (chain,) = vrm1(springs=[spring], colliders=[sphere, sphere], colliderGroups=groups).chains
+    assert chain.colliders == (1, 0)
+    colliders = [{"node": 2, "colliders": [{}, {}]}, {"node": 2, "colliders": [{}]}]
+    about = {"boneGroups": [{"bones": [0], "colliderGroups": [1, 0] * 10**4}], "colliderGroups": colliders}
+    assert stated("VRM", {"secondaryAnimation": about}).chains[0].colliders == (2, 0, 1)
 
 
 @pytest.mark.parametrize("extension", [3, {}, {"secondaryAnimation": None}, {"secondaryAnimation": {}}])
