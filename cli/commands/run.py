@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
@@ -23,13 +23,12 @@ from cli.workflows.run import journal as journals
 from cli.workflows.run import outputs, own_files
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
-from cli.workflows.run.job import Job
 from cli.workflows.run.plan import plan_jobs
 from cli.workflows.run.prune import prune
 from cli.workflows.run.recipe import chosen_recipes, read_recipes
 from cli.workflows.run.run import RecipeRun
+from cli.workflows.run.stale import report_stale
 
-MAX_LISTED_OUTPUTS = 3  # in a note
 Script = StrEnum("Script", [(name, name) for name in SCRIPTS])  # type: ignore[misc]
 
 
@@ -124,7 +123,7 @@ def command(
         planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
     except NotFoundError:  # as after all inputs were deleted
         if is_all and emit is None:
-            _report_stale(record, (), {}, reporter, delete=delete_stale)
+            report_stale(record, book, (), {}, reporter, delete=delete_stale)
         raise
     if emit is not None:
         readable, code = readable_jobs(planned)
@@ -143,7 +142,7 @@ def command(
     if not no_cache and run.counts[journals.MADE]:
         _prune(results, limit, reporter)
     if is_all:
-        _report_stale(record, run.jobs, run.written, reporter, delete=delete_stale)
+        report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
     else:
         record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written]
@@ -163,22 +162,6 @@ def _prune(results: caching.ResultCache, limit: int, reporter: Reporter) -> None
     if count:
         reporter.info(
             f"note: {plural(count, 'result')} ({format_bytes(size)}) deleted from the cache: see --cache-size"
-        )
-
-
-def _report_stale(
-    record: outputs.OutputRecord, jobs: Sequence[Job], written: Mapping[str, str], reporter: Reporter, *, delete: bool
-) -> None:
-    """Name outputs that no recipe makes any more, or delete them, after a run of all files and recipes."""
-    stale = record.find_stale([name for job in jobs for name in (job.input, job.output)])
-    if delete:
-        outputs.delete_outputs(record.folder, stale)
-    record.save(written, stale if delete else ())
-    if stale:
-        names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
-        what = "deleted" if delete else "--delete-stale deletes them"
-        reporter.info(
-            f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
         )
 
 
