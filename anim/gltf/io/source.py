@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -91,6 +91,7 @@ def write_file(
     source: Source | None,
     *,
     unchanged: Bytes | None = None,
+    spared: Sequence[Path] = (),
     dry_run: bool = False,
     note: Note = lambda words: None,
 ) -> int:
@@ -101,7 +102,7 @@ def write_file(
     In another folder images are copied to the output's folder, and no file is overwritten. Files are written
     atomically, and only if their bytes differ from the existing ones; otherwise only the modification time of the file
     at `path` is updated. unchanged: the input's bytes of the same content (`Source.bytes_of`), written instead of new
-    ones where possible.
+    ones where possible. spared: more files that are never removed.
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
     from anim.files import atomic
@@ -119,10 +120,10 @@ def write_file(
             atomic.write_file(Path(path), content)
         return sum(len(piece) for piece in content)
     same_folder = source is not None and source.is_in_folder(path)
-    spared = [] if source is None or source.is_at(path) else list(external_files(source))
+    needed = [] if source is None or source.is_at(path) else list(external_files(source))
     text = None if unchanged is None or unchanged[:4].tobytes() == container.MAGIC else unchanged
     size = gltf_files.write(
-        document, Path(path), same_folder=same_folder, spared=spared, text=text, dry_run=dry_run, note=note
+        document, Path(path), same_folder=same_folder, spared=[*spared, *needed], text=text, dry_run=dry_run, note=note
     )
     return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
 

@@ -82,7 +82,7 @@ def run_job(job: Job) -> JobResult:
         if code == errors.DONE:
             if job.cache is not None and stamp == stamp_of(job.folder / job.input):  # else of other bytes than its key
                 store(job, product, files)
-            size = write_output(job, product)
+            size = write_output(job, product, files)
             others = stamp_companions(job, product, files)
         return code
 
@@ -141,10 +141,11 @@ def store(job: Job, product: Bytes, files: Sequence[Path]) -> None:
     ResultCache(job.cache).store(job.key, product, others, is_plain=is_plain)
 
 
-def write_output(job: Job, product: Bytes) -> int:
+def write_output(job: Job, product: Bytes, read: Iterable[str | Path]) -> int:
     """Write the GLB of the last step as the output, with external images copied beside it; return its size in bytes.
 
-    The same bytes are not written again. Raises AnimError.
+    read: files that the steps read, which stay when those of a replaced .gltf are removed. The same bytes are not
+    written again. Raises AnimError.
     """
     check_output(job)
     path = job.folder / job.output
@@ -154,8 +155,9 @@ def write_output(job: Job, product: Bytes) -> int:
         raise not_written(str(path.parent), error) from None
     folder = (job.folder / job.input).parent
     source = open_bytes(product, job.output)._replace(folder=folder)
+    spared = [job.folder / each for each in read]
     try:
-        size = write_file(source.document, str(path), source, unchanged=product)
+        size = write_file(source.document, str(path), source, unchanged=product, spared=spared)
     except AnimError as error:
         error.problem = error.problem.replace(str(path), job.output)
         raise

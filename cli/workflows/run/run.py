@@ -134,7 +134,7 @@ class RecipeRun:
 
         def write() -> None:
             nonlocal size, files
-            size = write_output(job, product)
+            size = write_output(job, product, record.files)
             files = stamp_companions(job, product, record.files)
 
         with use_streams(streams):
