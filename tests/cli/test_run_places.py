@@ -53,19 +53,39 @@ def test_an_output_is_no_file_that_its_own_steps_read(folder: Path, call: Call) 
     assert "is a file that its own steps read" in refusal(call("run"), 2)
 
 
-def test_a_step_may_read_what_another_recipe_makes(folder: Path, call: Call) -> None:
-    write_recipe(folder, PLAIN)
-    write_recipe(folder, "from-euler --onto 'build/crowd/arm 1.glb'", match="*.bvh", out="build/{stem}.glb")
-    (folder / "take.bvh").write_text("HIERARCHY")
-    assert "2 files: 1 made, 1 failed" in call("run", "--jobs", "1").err  # the .bvh is none
-
-
 def test_a_link_made_during_the_run_is_found_before_writing(folder: Path) -> None:
     job = Job(folder, "crowd/arm 1.glb", "build/crowd/arm 1.glb", ())
     check_output(job)
     (folder / "build").symlink_to(".")
     with pytest.raises(OutputError, match="its own output"):
         check_output(job)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [("x/Hero.glb", "y/hero.glb"), ("x/\u00e4.glb", "y/a\u0308.glb"), ("x/Ä.glb", "y/a\u0308.glb")]
+)
+def test_names_that_are_one_on_some_file_systems_are_refused(first: str, second: str, folder: Path, call: Call) -> None:
+    """There one output replaced the other."""
+    for name in (first, second):
+        (folder / name).parent.mkdir()
+        (folder / name).write_bytes(built("arm"))
+    write_recipe(folder, PLAIN, match="[xy]/*.glb", out="build/{name}")
+    words = "the same output on file systems that ignore case"
+    assert words in refusal(call("run"), 2)
+    assert words in refusal(call("resample", first, second, "--fps", "12", "-o", "build/{name}"), 2)
+    assert not (folder / "build").exists()
+
+
+def test_an_input_is_no_output_in_other_case(folder: Path, call: Call) -> None:
+    """It was replaced where case does not count."""
+    (folder / "crowd/arm 1.glb").rename(folder / "crowd/Arm.glb")
+    write_recipe(folder, PLAIN, out="crowd/arm.glb")
+    assert "'crowd/Arm.glb' is its own output" in refusal(call("run"), 2)
+    (folder / "crowd/arm.bvh").write_text("HIERARCHY")
+    (folder / "gltf-anim.toml").unlink()
+    write_recipe(folder, "from-euler", match="crowd/*.bvh", out="crowd/arm.glb")
+    write_recipe(folder, PLAIN)
+    assert "the output of 'crowd/arm.bvh', is the input 'crowd/Arm.glb'" in refusal(call("run"), 2)
 
 
 def test_links_within_the_folder_remain(folder: Path, call: Call) -> None:
