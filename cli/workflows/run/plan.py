@@ -14,6 +14,7 @@ from cli.io import input_files
 from cli.workflows.check_config import matches
 from cli.workflows.run import places
 from cli.workflows.run.job import Job
+from cli.workflows.run.order import group_jobs
 from cli.workflows.run.outputs import OutputRecord
 from cli.workflows.run.recipe import Recipe, RecipeBook
 from cli.workflows.run.steps import EDITING
@@ -22,7 +23,7 @@ from cli.workflows.run.steps import EDITING
 def plan_jobs(
     book: RecipeBook, recipes: Sequence[Recipe], files: Sequence[str], earlier: OutputRecord, *, named: bool
 ) -> list[Job]:
-    """Return a job for each file and recipe that matches it; for the same output the first recipe counts.
+    """Return a job for each file and recipe that matches it, in order; for the same output the first recipe counts.
 
     files: paths, folders and patterns, from the working folder; empty for all files below the folder of the settings.
     earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
@@ -44,7 +45,10 @@ def plan_jobs(
                 raise UsageError(f"{book.path}: {problem}", help="out needs {path}, or {folder} with {name} or {stem}")
     chosen = [job for job in jobs.values() if job.input not in jobs or job.input == job.output]
     _check(book, chosen, given)
-    return chosen
+    try:
+        return [job for group in group_jobs(chosen) for job in group]
+    except UsageError as error:
+        raise UsageError(f"{book.path}: {error}") from None
 
 
 def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
