@@ -83,7 +83,7 @@ PUBLIC = {
         "apply bind_pose ground_contact joint_matching joint_roles rest_alignment retained_tracks retarget"
     ),
     "exchange.usd_skel": "write",
-    "gltf.io": "buffers container images json_text lenient source text_form uri",
+    "gltf.io": "buffers container gltf_files images json_text lenient source text_form uri",
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader scene_nodes vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets extensions hierarchy rules schema",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
@@ -24,12 +24,12 @@ from cli.workflows.run import outputs, own_files
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
 from cli.workflows.run.job import Job
-from cli.workflows.run.plan import plan_jobs
+from cli.workflows.run.plan import explain_unused, plan_jobs
 from cli.workflows.run.prune import prune
-from cli.workflows.run.recipe import chosen_recipes, read_recipes
+from cli.workflows.run.recipe import Recipe, RecipeBook, chosen_recipes, read_recipes
 from cli.workflows.run.run import RecipeRun
+from cli.workflows.run.stale import report_stale
 
-MAX_LISTED_OUTPUTS = 3  # in a note
 Script = StrEnum("Script", [(name, name) for name in SCRIPTS])  # type: ignore[misc]
 
 
@@ -101,7 +101,8 @@ def command(
         out = "build/{path}"
 
     match, out and files named in steps are relative to the folder of the settings. out takes {path}, {folder}, {name}
-    and {stem} (the name without extension). For two recipes with the same output the first counts.
+    and {stem} (the name without extension). For two recipes with the same output the first counts. Outputs are no
+    inputs of recipes, but steps may name them: these are made first.
 
     Results are kept by the content of the input and of the files that steps name, by the steps, and by the version of
     this tool: a second run makes nothing again. --resume continues a run that was interrupted, by its journal.
@@ -119,13 +120,16 @@ def command(
     book = read_recipes(config)
     folder = _cache_folder(book.folder, cache)
     record = outputs.read_outputs(folder / outputs.NAME, book.folder)
-    is_all = not (inputs or recipe)
+    is_all, chosen = not (inputs or recipe), chosen_recipes(book, recipe or ())
     try:
-        planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
+        planned = plan_jobs(book, chosen, inputs or (), record, named=bool(recipe))
     except NotFoundError:  # as after all inputs were deleted
+        _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
-            _report_stale(record, (), {}, reporter, delete=delete_stale)
+            report_stale(record, book, (), {}, reporter, delete=delete_stale)
         raise
+    if not inputs:
+        _warn_of_unused(book, chosen, planned, record, reporter)
     if emit is not None:
         readable, code = readable_jobs(planned)
         if readable:
@@ -143,7 +147,7 @@ def command(
     if not no_cache and run.counts[journals.MADE]:
         _prune(results, limit, reporter)
     if is_all:
-        _report_stale(record, run.jobs, run.written, reporter, delete=delete_stale)
+        report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
     else:
         record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written]
@@ -158,27 +162,18 @@ def _cache_folder(settings: Path, named: str | None) -> Path:
     return settings / caching.NAME
 
 
+def _warn_of_unused(
+    book: RecipeBook, chosen: Sequence[Recipe], jobs: Sequence[Job], record: outputs.OutputRecord, reporter: Reporter
+) -> None:
+    for line in explain_unused(book, chosen, jobs, record):
+        reporter.warn(line)
+
+
 def _prune(results: caching.ResultCache, limit: int, reporter: Reporter) -> None:
     count, size = prune(results, limit)
     if count:
         reporter.info(
             f"note: {plural(count, 'result')} ({format_bytes(size)}) deleted from the cache: see --cache-size"
-        )
-
-
-def _report_stale(
-    record: outputs.OutputRecord, jobs: Sequence[Job], written: Mapping[str, str], reporter: Reporter, *, delete: bool
-) -> None:
-    """Name outputs that no recipe makes any more, or delete them, after a run of all files and recipes."""
-    stale = record.find_stale([name for job in jobs for name in (job.input, job.output)])
-    if delete:
-        outputs.delete_outputs(record.folder, stale)
-    record.save(written, stale if delete else ())
-    if stale:
-        names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
-        what = "deleted" if delete else "--delete-stale deletes them"
-        reporter.info(
-            f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
         )
 
 

@@ -48,15 +48,33 @@ def expand(output: str, rows: Sequence[Mapping[str, str]], numbers: Sequence[int
     expand("{clip}.npz", [{"clip": "walk"}, {"clip": "Walk"}], [0, 3]) → ["walk.npz", "Walk-3.npz"]
     """
     names: list[str] = []
-    taken: set[str] = set()  # some file systems ignore case: "Walk" and "walk" collide
+    taken: set[str] = set()
     for row, number in zip(rows, numbers, strict=True):
         values = {key: _plain(value) or str(number) for key, value in row.items()}
         last = next((key for key in reversed(values) if f"{{{key}}}" in output), "")
-        while (file := _filled(output, values)).casefold() in taken and last:
+        while name_key(file := _filled(output, values)) in taken and last:
             values[last] += f"-{number}"
         names.append(file)
-        taken.add(file.casefold())
+        taken.add(name_key(file))
     return names
+
+
+def name_key(path: str) -> str:
+    """Return a key that is equal for names which some file system takes for one.
+
+    These ignore case, or the difference between a composed letter and a letter with a combining accent.
+    name_key("Walk.glb") → "walk.glb"
+    """
+    if path.isascii():
+        return path.lower()
+    import unicodedata
+
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
+
+
+def say_where_equal(name: str, other: str) -> str:
+    """Return words for a message on two names of one file: empty if it is one everywhere, as by a link."""
+    return " on file systems that ignore case" if name != other and name_key(name) == name_key(other) else ""
 
 
 def fill_path(output: str, path: str, **others: str) -> str:

@@ -107,9 +107,10 @@ def plan_files(
             raise UsageError("stdin has no name for --out: name files")
         pair = FilePair(each.path, output_names.fill_path(pattern, os.path.relpath(each.path, each.folder)))
         check(pair.output)
-        same = pairs.setdefault(os.path.realpath(pair.output), pair)
+        same = pairs.setdefault(_key(pair.output), pair)
         if same is not pair:
-            problem = f"'{same.input}' and '{pair.input}' have the same output, '{pair.output}'"
+            where = output_names.say_where_equal(same.output, pair.output)
+            problem = f"'{same.input}' and '{pair.input}' have the same output{where}, '{pair.output}'"
             raise UsageError(problem, help="--out needs {path}, or {folder} with {name} or {stem}")
     _check_inputs(list(pairs.values()))
     return list(pairs.values())
@@ -117,11 +118,15 @@ def plan_files(
 
 def _check_inputs(pairs: Sequence[FilePair]) -> None:
     """Raise UsageError if an output would replace the input of another file."""
-    inputs = {os.path.realpath(pair.input): pair.input for pair in pairs}
+    inputs = {_key(pair.input): pair.input for pair in pairs}
     for pair in pairs:
-        other = inputs.get(os.path.realpath(pair.output), pair.input)
+        other = inputs.get(_key(pair.output), pair.input)
         if other != pair.input:
             raise UsageError(f"the output of '{pair.input}' would replace '{other}', which is an input too")
+
+
+def _key(path: str) -> str:
+    return output_names.name_key(os.path.realpath(path))
 
 
 def _is_output(found: input_files.FoundFile, pattern: str) -> bool:

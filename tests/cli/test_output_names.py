@@ -21,6 +21,8 @@ def test_names_are_told_apart() -> None:
     clips = [{"clip": "walk"}, {"clip": "Walk"}, {"clip": "a/b"}, {"clip": ""}]
     assert expand("x/{clip}.npz", clips, [0, 3, 4, 5]) == ["x/walk.npz", "x/Walk-3.npz", "x/a_b.npz", "x/5.npz"]
     assert expand("{mesh}-{clip}.npz", [{"mesh": "{clip}", "clip": "a"}], [0]) == ["{clip}-a.npz"]
+    clips = [{"clip": "\u00e4"}, {"clip": "a\u0308"}, {"clip": "A\u0308"}]  # one name where accents are combined
+    assert expand("{clip}.npz", clips, [0, 1, 2]) == ["\u00e4.npz", "a\u0308-1.npz", "A\u0308-2.npz"]
 
 
 def test_names_of_many_clips_are_told_apart_at_once() -> None:

@@ -67,6 +67,22 @@ def test_resume_after_a_run_from_the_cache_has_the_same_stamps(text_file: Path, 
     assert "1 file: 1 made" in call("run", "--resume").err
 
 
+def test_the_buffer_of_the_input_is_not_removed_with_the_old_output(text_file: Path, call: Call) -> None:
+    """It belonged to the output that the run replaces, as its name says."""
+    (text_file / "gltf-anim.toml").unlink()
+    write_recipe(text_file, "resample --fps 12", match="arm.gltf", out="far/out/{name}")
+    call("convert", "crowd/arm 1.glb", "arm.gltf").product()
+    old = (text_file / "arm.gltf").read_text(), (text_file / "arm.bin").read_bytes()
+    (text_file / "arm.bin").unlink()
+    (text_file / "arm.gltf").write_text(old[0].replace("arm.bin", "far/out/arm.bin"))
+    (text_file / "far/out").mkdir(parents=True)
+    for status in ("made", "cached"):
+        (text_file / "far/out/arm.gltf").write_text(old[0])
+        (text_file / "far/out/arm.bin").write_bytes(old[1])
+        assert f"1 file: 1 {status}" in call("run").err
+        assert (text_file / "far/out/arm.bin").read_bytes() == old[1]
+
+
 def test_images_that_a_step_embeds_count_for_the_cache(text_file: Path, call: Call) -> None:
     (text_file / "gltf-anim.toml").unlink()
     write_recipe(text_file, "convert --embed", match="crowd/*.gltf", out="build/{stem}.glb")

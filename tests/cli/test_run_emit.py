@@ -55,6 +55,20 @@ def test_make_and_ninja_know_the_files_that_steps_and_inputs_name(folder: Path, 
     assert line in call("run", "--emit", "ninja").text
 
 
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_script_makes_first_what_the_steps_of_others_read(tool: str, folder: Path, call: Call) -> None:
+    if shutil.which(TOOLS[tool][0]) is None:
+        pytest.skip(f"{TOOLS[tool][0]} is not installed")
+    (folder / "take.bvh").write_bytes(call("to-euler", "crowd/arm 1.glb", "-", "--clip", "#0").product())
+    onto = "from-euler --onto build//x/../hero.glb"
+    write_recipe(folder, onto, match="*.bvh", out="clips/{stem}.glb")
+    write_recipe(folder, "resample --fps 12", match="crowd/*.glb", out="build/hero.glb")
+    (folder / "script").write_bytes(call("run", "--emit", tool).product())
+    (folder / "build/x").mkdir(parents=True)
+    subprocess.run([*TOOLS[tool], "script"], cwd=folder, env=ENVIRONMENT, check=True, capture_output=True)
+    assert (folder / "clips/take.glb").read_bytes() == call(*onto.split(), "take.bvh").product()
+
+
 def test_make_refuses_names_that_it_can_not_have(folder: Path, call: Call) -> None:
     (folder / "crowd/arm 1.glb").rename(folder / "crowd/100%.glb")
     write_recipe(folder, "resample --fps 12")

@@ -76,6 +76,74 @@ def test_buffers_and_empty_folders_are_deleted_too(made: Path, call: Call) -> No
     assert [path.name for path in (made / "build").iterdir()] == ["hero"]
 
 
+@pytest.mark.parametrize(
+    ("link", "target", "match"),
+    [
+        ("build", "models", "models/crowd/*.glb"),
+        ("models", "build", "models/crowd/*.glb"),
+        ("cube.glb", "build/crowd/cube.glb", "cube.glb"),
+    ],
+)
+def test_outputs_that_a_recipe_reads_by_another_name_are_not_deleted(
+    link: str, target: str, match: str, made: Path, call: Call
+) -> None:
+    """The input was deleted, with exit 0."""
+    if link == "build":
+        (made / "build").rename(made / target)
+    (made / link).symlink_to(target)
+    (made / "gltf-anim.toml").unlink()
+    write_recipe(made, *PLAIN, match=match, out="small/{path}")
+    call("run", "--delete-stale").product()
+    assert (made / "build/crowd/cube.glb").exists()
+
+
+@pytest.mark.parametrize("against", ["build/crowd/cube.glb", "build/crowd/{stem}e.glb"])
+def test_outputs_that_a_step_or_budget_names_are_not_deleted(against: str, made: Path, call: Call) -> None:
+    """The next run was exit 3: a recipe of a step's file was taken away."""
+    (made / "gltf-anim.toml").unlink()
+    (made / "crowd/hero.glb").rename(made / "crowd/cub.glb")
+    write_recipe(made, *PLAIN)
+    if "{" in against:
+        budget = f'[[budget]]\nmatch = "build/**"\nerror = "1m"\nagainst = "{against}"\n'
+        (made / "gltf-anim.toml").write_text((made / "gltf-anim.toml").read_text() + budget)
+    else:
+        write_recipe(made, f"from-euler --onto {against}", match="*.bvh", out="clips/{stem}.glb")
+    assert "(build/crowd/hero.glb): deleted" in call("run", "--delete-stale").err
+    assert outputs(made) == {"build/crowd/cub.glb", "build/crowd/cube.glb"}
+
+
+def test_shared_buffers_are_not_deleted(made: Path, call: Call) -> None:
+    """The copy was broken, and buffers named by their content remained."""
+    write_crowd(made, cube="morph_cube")
+    (made / "gltf-anim.toml").unlink()
+    write_recipe(made, *PLAIN, out="build/{stem}.gltf")
+    call("run", "--delete-stale").product()
+    shutil.copy(made / "build/cube.gltf", made / "build/keep.gltf")
+    (made / "build/hero.bin").rename(made / "build/taken")
+    (made / "build/hero.bin").write_bytes(b"other")
+    (made / "build/hero.gltf").unlink()
+    call("run").product()
+    (by_content,) = (made / "build").glob("hero-*.bin")
+    shutil.rmtree(made / "crowd")
+    assert "no recipe makes 2 outputs" in call("run", "--delete-stale").err
+    assert outputs(made) == {f"build/{name}" for name in ("keep.gltf", "cube.bin", "hero.bin", "taken")}
+    assert not by_content.exists()
+
+
+def test_buffers_of_inputs_are_not_deleted(made: Path, call: Call) -> None:
+    """They were, where the input is more than one folder above."""
+    write_crowd(made, cube="morph_cube")
+    (made / "gltf-anim.toml").unlink()
+    write_recipe(made, *PLAIN, out="build/far/{stem}.gltf")
+    call("run", "--delete-stale").product()
+    text = (made / "build/far/cube.gltf").read_text()
+    (made / "top.gltf").write_text(text.replace("cube.bin", "build/far/cube.bin"))
+    write_recipe(made, *PLAIN, match="*.gltf", out="small/{path}")
+    (made / "crowd/cube.glb").unlink()
+    assert "(build/far/cube.gltf): deleted" in call("run", "--delete-stale").err
+    assert outputs(made) == {"build/far/cube.bin", "build/far/hero.gltf", "build/far/hero.bin"}
+
+
 def test_outputs_beside_their_inputs_are_no_inputs_when_these_are_deleted(folder: Path, call: Call) -> None:
     write_crowd(folder, hero="biped", cube="morph_cube")
     (folder / "crowd/arm 1.glb").unlink()

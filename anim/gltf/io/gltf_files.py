@@ -59,6 +59,23 @@ def write(
     return sum(len(piece) for pieces in (content, *files.values()) for piece in pieces)
 
 
+def remove(paths: Sequence[Path], spared: Sequence[Path] = ()) -> None:
+    """Remove files, and those buffers of .gltf files that this program wrote and that nothing else uses.
+
+    spared: files that are never removed. The buffers follow when all files are gone, so that none of these counts as a
+    user. Raises OutputError.
+    """
+    buffers: dict[Path, Sequence[str]] = {}
+    for path in paths:
+        with atomic.name_errors(path):
+            if path.suffix.lower() == ".gltf":
+                buffers[path] = unused_buffers.external_buffers(path)
+            path.unlink(missing_ok=True)
+    for path, old in buffers.items():
+        with lock_folder(path.parent), atomic.name_errors(path):
+            unused_buffers.remove_unused(old, path, (), spared)
+
+
 @dataclass
 class _Names:
     """Names of new buffers in a folder.

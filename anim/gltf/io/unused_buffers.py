@@ -1,4 +1,4 @@
-"""Remove buffers that a replaced .gltf no longer uses, if this program wrote them.
+"""Remove buffers that a replaced or removed .gltf no longer uses, if this program wrote them.
 
 Their names derive from the .gltf (`walk.bin` of walk.gltf) or from their content (`walk-1a2b3c4d.bin`). They are
 removed unless another glTF in the folder or its parent, of any file name (walk.gltf.bak), or a link refers to them.
@@ -35,11 +35,12 @@ def external_buffers(path: Path) -> tuple[str, ...]:
 def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared: Sequence[Path]) -> list[str]:
     """Remove the buffers `old` that neither the .gltf at `path` nor any other known file uses.
 
-    text: of the .gltf. spared: files that others need. Returns the names of unused files that remain, since this
-    program did not write them.
+    text: of the .gltf, nothing if it was removed. spared: files that others need. Returns the names of unused files
+    that remain, since this program did not write them.
     """
     left = []
-    needed = [*(path.parent / each for each in _named(container.read(np.concatenate(text)))), *spared]
+    named = _named(container.read(np.concatenate(text))) if text else ()
+    needed = [*(path.parent / each for each in named), *spared]
     for name in sorted({*old} - {""}):
         there = path.parent / name
         if not there.is_file() or any(each.exists() and each.samefile(there) for each in needed):

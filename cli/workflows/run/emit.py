@@ -17,6 +17,7 @@ from anim.gltf.io.source import buffer_files, open_file
 from cli.errors import DONE, PROGRAM, UsageError, run_guarded
 from cli.io import output_names
 from cli.workflows.run.job import Job, argument_of
+from cli.workflows.run.places import output_key
 from cli.workflows.run.steps import EDITING, Step
 
 HEADER = f"# made by `{PROGRAM} run --emit`"
@@ -40,10 +41,10 @@ def shell_script(jobs: Sequence[Job]) -> str:
 
 def makefile(jobs: Sequence[Job]) -> str:
     """Return rules for make, to be used in the folder of the settings."""
-    rules, names = [], []
+    rules, names, outputs = [], [], _outputs(jobs)
     for job in jobs:
         _check_images(job)
-        output, *inputs = (_in_make(name) for name in (job.output, job.input, *_other_inputs(job)))
+        output, *inputs = (_in_make(name) for name in (job.output, job.input, *_other_inputs(job, outputs)))
         rules.append(f"{output}: {' '.join(inputs)}\n\t" + "\n\t".join(_make_commands(job)) + "\n")
         names.append(output)
     head = [HEADER, ".DELETE_ON_ERROR:", ".PHONY: all", f"all: {' '.join(names)}\n"]
@@ -53,12 +54,12 @@ def makefile(jobs: Sequence[Job]) -> str:
 def ninja_file(jobs: Sequence[Job]) -> str:
     """Return rules and builds for ninja, to be used in the folder of the settings."""
     rules: dict[tuple[tuple[Step, ...], str, str], str] = {}
-    builds = []
+    builds, outputs = [], _outputs(jobs)
     for job in jobs:
         _check_images(job)
         key = (job.steps, _variable_in_ninja("$in", job.input), _variable_in_ninja("$out", job.output))
         name = rules.setdefault(key, f"recipe{len(rules) + 1}")
-        output, *inputs = (_in_ninja(each) for each in (job.output, job.input, *_other_inputs(job)))
+        output, *inputs = (_in_ninja(each) for each in (job.output, job.input, *_other_inputs(job, outputs)))
         implicit = f" | {' '.join(inputs[1:])}" if inputs[1:] else ""
         builds.append(f"build {output}: {name} {inputs[0]}{implicit}\n")
     texts = []
@@ -102,10 +103,15 @@ def _pipeline(steps: Sequence[Step], input: str, output: str, escape: Escape = s
     return " | ".join(lines)
 
 
-def _other_inputs(job: Job) -> Iterator[str]:
+def _outputs(jobs: Sequence[Job]) -> dict[str, str]:
+    """Outputs by their keys: a step may read one by another spelling, which make would take for another file."""
+    return {output_key(job.output): job.output for job in jobs}
+
+
+def _other_inputs(job: Job, outputs: Mapping[str, str]) -> Iterator[str]:
     """Yield the other files that a job reads: of its steps' options, and buffers of the input."""
     for step in job.steps:
-        yield from step.files
+        yield from (outputs.get(output_key(name), name) for name in step.files)
     if job.steps[0].command[0] in EDITING:
         for path in buffer_files(open_file(str(job.folder / job.input))):
             yield os.path.relpath(path, os.path.realpath(job.folder))

@@ -1,9 +1,8 @@
-"""Outputs of earlier runs: those that no recipe makes any more, as after an input was deleted."""
+"""Record of the outputs that earlier runs have written."""
 
 from __future__ import annotations
 
 import json
-import stat
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,12 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from anim.errors import AnimError, not_written
 from anim.gltf.io.container import SUFFIXES
-from anim.gltf.io.source import buffer_files, open_file
 from cli.workflows.check_config import matches
 from cli.workflows.run import own_files
-from cli.workflows.run.job import is_text
 from cli.workflows.run.recipe import Recipe
 from cli.workflows.run.stamps import Stamp, parse_stamp, stamp_of
 
@@ -46,14 +42,6 @@ class OutputRecord:
             return False
         source = self.outputs[name][0]
         return any(matches(source, each.match) and each.output_of(source) == name for each in recipes)
-
-    def find_stale(self, used: Collection[str]) -> list[str]:
-        """Return the unchanged outputs that are not used, sorted. used: inputs and outputs of all recipes.
-
-        Files elsewhere, to which a link leads, and links are left alone.
-        """
-        unused = filter(self.is_unchanged, self.outputs.keys() - set(used))
-        return sorted(name for name in unused if _is_inside(self.folder, name))
 
     def save(self, written: Mapping[str, str], forgotten: Collection[str] = ()) -> None:
         """Add outputs, each with its input, to the record, and remove some. Raises OutputError."""
@@ -86,40 +74,6 @@ def _is_output_name(name: str) -> bool:
     """Return whether a recipe can have an output of this name: the record may be another's work."""
     path = PurePath(name)
     return not path.is_absolute() and ".." not in path.parts and path.suffix.lower() in SUFFIXES
-
-
-def _is_inside(folder: Path, name: str) -> bool:
-    """Return whether a name is that of a regular file, no link, that really is below the folder."""
-    path = folder / name
-    try:
-        return stat.S_ISREG(path.lstat().st_mode) and path.resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError):
-        return False
-
-
-def delete_outputs(folder: Path, names: Iterable[str]) -> None:
-    """Delete outputs, with buffers of .gltf files beside them, and folders that become empty. Raises OutputError."""
-    for name in names:
-        path = folder / name
-        try:
-            for each in (*_buffers(path), path):
-                each.unlink(missing_ok=True)
-        except OSError as error:
-            raise not_written(name, error) from None
-        with suppress(OSError):  # not empty
-            for above in path.relative_to(folder).parents[:-1]:
-                (folder / above).rmdir()
-
-
-def _buffers(path: Path) -> list[Path]:
-    """Buffers of a .gltf that have its name."""
-    if not is_text(path.name):
-        return []
-    try:
-        files = [Path(each) for each in buffer_files(open_file(str(path)))]
-    except AnimError:
-        return []
-    return [each for each in files if each.parent == path.parent.resolve() and each.stem == path.stem]
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from anim.errors import FormatError, OutputError
 from anim.files.special_files import is_device_or_pipe
+from cli.io.output_names import name_key, say_where_equal
 
 RealPath: TypeAlias = Callable[[str], str]  # a path without links
 
@@ -19,24 +20,27 @@ if TYPE_CHECKING:  # which imports this module
 
 
 def find_clashes(jobs: Sequence[Job]) -> Iterator[str]:
-    """Yield the problems of outputs that links lead elsewhere: to an input, to another output, or out of the folder.
+    """Yield the problems of outputs that are an input, another output, or out of the folder of the settings.
 
-    Names alone don't show it: with a link `build` to ".", "build/a.glb" is "a.glb". A file of another job's steps may
-    be an output by its name: one recipe makes what the next one reads.
+    Names alone don't show it: with a link `build` to ".", "build/a.glb" is "a.glb", and some file systems ignore case.
+    A file of another job's steps may be an output by its name: one recipe makes what the next one reads.
     """
     real_of = _real_paths()
-    outputs = {job.output for job in jobs}
-    names = dict.fromkeys((job.folder, name) for job in jobs for name in _inputs(job))  # in order, for messages
-    read = {real_of(os.path.join(folder, name)): name for folder, name in names if _as_output(name) not in outputs}
+    outputs = {output_key(job.output) for job in jobs}
+    names = dict.fromkeys((job.folder, job.input) for job in jobs)  # in order, for messages
+    names |= dict.fromkeys(
+        (job.folder, name) for job in jobs for name in _step_files(job) if output_key(name) not in outputs
+    )
+    read = {name_key(real_of(os.path.join(folder, name))): name for folder, name in names}
     made = dict[str, str]()
     for job in jobs:
-        real = real_of(os.path.join(job.folder, job.output))
+        real = name_key(real_of(os.path.join(job.folder, job.output)))
         if problem := _problem(job, real_of):
             yield problem
         elif real in read:
             yield f"'{job.output}', the output of '{job.input}', is the input '{read[real]}'"
-        elif made.setdefault(real, job.output) != job.output:
-            yield f"'{job.output}' and '{made[real]}' are the same output"
+        elif (other := made.setdefault(real, job.output)) != job.output:
+            yield f"'{job.output}' and '{other}' are the same output{say_where_equal(job.output, other)}"
 
 
 def check_output(job: Job) -> None:
@@ -52,13 +56,12 @@ def check_regular(folder: Path, names: Iterable[str]) -> None:
             raise FormatError("is no regular file", where=name)
 
 
-def _as_output(name: str) -> str:
-    """A name as outputs are written: with "/", and no dots."""
-    return posixpath.normpath(name.replace(os.sep, "/"))
+def output_key(name: str) -> str:
+    """Return the key of a name as outputs are written: with "/", and no dots."""
+    return name_key(posixpath.normpath(name.replace(os.sep, "/")))
 
 
-def _inputs(job: Job) -> Iterator[str]:
-    yield job.input
+def _step_files(job: Job) -> Iterator[str]:
     for step in job.steps:
         yield from step.files
 
@@ -66,9 +69,12 @@ def _inputs(job: Job) -> Iterator[str]:
 def _problem(job: Job, real_of: RealPath) -> str:
     """Problem of the output of a job by its own files, empty without any."""
     real = real_of(os.path.join(job.folder, job.output))
-    if real == real_of(os.path.join(job.folder, job.input)):
-        return f"'{job.input}' is its own output ('{job.output}' is a link to it, or below one)"
-    if real in (real_of(os.path.join(job.folder, name)) for name in _inputs(job)):
+    key, input, *files = (
+        name_key(real_of(os.path.join(job.folder, name))) for name in (job.output, job.input, *_step_files(job))
+    )
+    if key == input:
+        return f"'{job.input}' is its own output ('{job.output}' is a link to it, below one, or differs by case only)"
+    if key in files:
         return f"'{job.output}', the output of '{job.input}', is a file that its own steps read"
     if not real.startswith(os.path.join(real_of(str(job.folder)), "")):
         return f"'{job.output}' leads out of the folder of the settings, by a link"

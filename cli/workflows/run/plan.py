@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path, PurePosixPath
 
 from anim.errors import NotFoundError
@@ -14,6 +15,7 @@ from cli.io import input_files
 from cli.workflows.check_config import matches
 from cli.workflows.run import places
 from cli.workflows.run.job import Job
+from cli.workflows.run.order import group_jobs
 from cli.workflows.run.outputs import OutputRecord
 from cli.workflows.run.recipe import Recipe, RecipeBook
 from cli.workflows.run.steps import EDITING
@@ -22,12 +24,13 @@ from cli.workflows.run.steps import EDITING
 def plan_jobs(
     book: RecipeBook, recipes: Sequence[Recipe], files: Sequence[str], earlier: OutputRecord, *, named: bool
 ) -> list[Job]:
-    """Return a job for each file and recipe that matches it; for the same output the first recipe counts.
+    """Return a job for each file and recipe that matches it, in order; for the same output the first recipe counts.
 
     files: paths, folders and patterns, from the working folder; empty for all files below the folder of the settings.
     earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
     named: whether the recipes are named by the command line: then files need not match.
-    Outputs are never inputs. Raises UsageError for two files with one output, and NotFoundError without any file.
+    Outputs are never inputs: "*.glb" would match those beside their inputs. Raises UsageError for two files with one
+    output, and NotFoundError without any file.
     """
     given = [_relative(book, each) for each in input_files.expand(files)]
     jobs: dict[str, Job] = {}
@@ -44,7 +47,27 @@ def plan_jobs(
                 raise UsageError(f"{book.path}: {problem}", help="out needs {path}, or {folder} with {name} or {stem}")
     chosen = [job for job in jobs.values() if job.input not in jobs or job.input == job.output]
     _check(book, chosen, given)
-    return chosen
+    try:
+        return [job for group in group_jobs(chosen) for job in group]
+    except UsageError as error:
+        raise UsageError(f"{book.path}: {error}") from None
+
+
+def explain_unused(
+    book: RecipeBook, recipes: Sequence[Recipe], jobs: Sequence[Job], earlier: OutputRecord
+) -> Iterator[str]:
+    """Yield a line for each recipe that makes nothing since it matches only outputs of others, which are no inputs."""
+    for recipe in recipes:
+        if any(job.steps is recipe.steps for job in jobs) or any(matches(job.input, recipe.match) for job in jobs):
+            continue
+        others = [each for each in book.recipes if each is not recipe]
+        products = (name for name in earlier.outputs if earlier.is_product(name, others))
+        own = _fixed_folder(recipe.out, "{")
+        for name in chain((job.output for job in jobs), products):
+            if matches(name, recipe.match) and (not own or not PurePosixPath(name).is_relative_to(own)):
+                problem = f"recipe '{recipe.name}' makes nothing: it matches only outputs of others ('{name}')"
+                yield f"{problem}, which are no inputs: put all steps of a file into one recipe"
+                break
 
 
 def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:

@@ -25,10 +25,11 @@ from cli.workflows.run.job import (
     input_size,
     is_text,
     run_job,
-    stamp_companions,
     write_output,
 )
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
+from cli.workflows.run.order import group_jobs, keys_read
+from cli.workflows.run.places import output_key
 from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
 from cli.workflows.run.steps import Step
 from cli.workflows.run.workers import local_pool, run_jobs
@@ -53,15 +54,17 @@ class RecipeRun:
     code: int = errors.DONE
     _hashes: FileHashes = field(default_factory=FileHashes)
     _recipes: dict[tuple[Step, ...], str] = field(default_factory=dict)
+    _failed: dict[str, tuple[str, int]] = field(default_factory=dict)  # outputs and exit codes, by `output_key`
 
     def run(self) -> int:
         """Run all jobs; return the largest exit code."""
         began = time.perf_counter()
         self._progress = Progress("", len(self.jobs), shown=not self.reporter.quiet)
         try:
-            with closing(self._results(self._look_up())) as results:  # ends the workers
-                for job, result in results:
-                    self._record(job, result, MADE if result.code == errors.DONE else FAILED)
+            for group in group_jobs(self.jobs):
+                with closing(self._results(group)) as results:  # ends the workers
+                    for job, result in results:
+                        self._record(job, result, MADE if result.code == errors.DONE else FAILED)
         except (KeyboardInterrupt, SystemExit):
             self._progress.close()
             self.reporter.info(
@@ -76,26 +79,25 @@ class RecipeRun:
         self.journal.write_line({"end": {**self.counts, "code": self.code}})
         return self.code
 
-    def _results(self, missing: Iterator[Job]) -> Generator[tuple[Job, JobResult], None, None]:
+    def _results(self, group: Sequence[Job]) -> Generator[tuple[Job, JobResult], None, None]:
+        """Yield the jobs of a group that have no known result, each with its new one."""
+        count = min(self.processes, len(group))  # of this machine, at a time
+        missing = self._look_up(group, cores=1 if self.cluster else max(1, self.processes // count))
         if len(self.jobs) == 1 and self.cluster is None:  # in this process: starting another takes longer
             yield from ((job, run_job(job)) for job in missing)
             return
         first = next(missing, None)
         if first is not None:
-            pool, count = (
-                (local_pool, self._count) if self.cluster is None else (self.cluster.open_pool, self.cluster.count)
-            )
+            pool, count = (local_pool, count) if self.cluster is None else (self.cluster.open_pool, self.cluster.count)
             yield from run_jobs(chain([first], missing), pool, count)
 
-    @property
-    def _count(self) -> int:
-        """Number of jobs at a time on this machine."""
-        return min(self.processes, len(self.jobs))
-
-    def _look_up(self) -> Iterator[Job]:
+    def _look_up(self, group: Sequence[Job], *, cores: int) -> Iterator[Job]:
         """Yield the jobs without a known result; of others, write the output."""
-        for each in self.jobs:
-            job = replace(each, cores=1 if self.cluster else max(1, self.processes // self._count))
+        for each in group:
+            if (lacking := self._find_lacking(each)) is not None:
+                self._record(each, lacking, FAILED)
+                continue
+            job = replace(each, cores=cores)
             recipe = self._recipe(job)
             done = self.journal.find_done(job.folder, job.input, job.output, recipe)
             if done is not None:
@@ -113,6 +115,14 @@ class RecipeRun:
                     yield keyed
                 else:
                     self._record(job, found, CACHED if found.code == errors.DONE else FAILED)
+
+    def _find_lacking(self, job: Job) -> JobResult | None:
+        """The result of a job whose steps read an output that failed; None of any other."""
+        key = next(keys_read(job.steps, self._failed), None)
+        if key is None:
+            return None
+        failed, code = self._failed[key]
+        return JobResult(code, (f"{errors.PROGRAM}: {job.input}: its steps read '{failed}', which was not made",))
 
     def _from_cache(self, job: Job, cache: ResultCache) -> JobResult | None:
         """The result of a job from the cache, with its output written; None if there is none."""
@@ -134,8 +144,7 @@ class RecipeRun:
 
         def write() -> None:
             nonlocal size, files
-            size = write_output(job, product)
-            files = stamp_companions(job, product, record.files)
+            size, files = write_output(job, product, record.files)
 
         with use_streams(streams):
             code = run_guarded(write)
@@ -149,7 +158,9 @@ class RecipeRun:
 
     def _record(self, job: Job, result: JobResult, status: str) -> None:
         self.counts[status] += 1
-        if status != FAILED:
+        if status == FAILED:
+            self._failed[output_key(job.output)] = job.output, result.code
+        else:
             self.written[job.output] = job.input
         self.code = max(self.code, result.code)
         self._progress.close()

@@ -1,0 +1,114 @@
+"""Stale outputs: those of earlier runs that no recipe makes any more, as after an input was deleted."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from anim.errors import AnimError
+from anim.gltf.io import gltf_files
+from anim.gltf.io.source import external_files, open_file
+from anim.units import plural
+from cli.errors import UsageError
+from cli.text import Reporter
+from cli.workflows import check_config
+from cli.workflows.run.job import Job, is_text
+from cli.workflows.run.outputs import OutputRecord
+from cli.workflows.run.recipe import RecipeBook
+
+MAX_LISTED_OUTPUTS = 3  # in a note
+
+
+def report_stale(
+    record: OutputRecord,
+    book: RecipeBook,
+    jobs: Sequence[Job],
+    written: Mapping[str, str],
+    reporter: Reporter,
+    *,
+    delete: bool,
+) -> None:
+    """Name the stale outputs, or delete them, after a run of all files and recipes; save the record.
+
+    Raises OutputError, and UsageError for settings of budgets that are wrong.
+    """
+    stale = find_stale(record, book, jobs)
+    if delete:
+        _delete(record.folder, stale, _files_read(book, jobs))
+    record.save(written, stale if delete else ())
+    if stale:
+        names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
+        what = "deleted" if delete else "--delete-stale deletes them"
+        reporter.info(
+            f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
+        )
+
+
+def find_stale(record: OutputRecord, book: RecipeBook, jobs: Sequence[Job]) -> list[str]:
+    """Return the unchanged outputs of earlier runs that no job makes and that nothing here reads, sorted.
+
+    Links, and files behind a link, are left alone: they may be somebody else's.
+    """
+    outputs = {job.output for job in jobs}
+    unused = filter(record.is_unchanged, sorted(record.outputs.keys() - outputs))
+    found = [name for name in unused if _is_plain(record.folder, name)]
+    if not found:
+        return []
+    needed = {_identity(record.folder / name) for name in (*outputs, *_files_read(book, jobs))}
+    return [name for name in found if _identity(record.folder / name) not in needed]
+
+
+def _files_read(book: RecipeBook, jobs: Iterable[Job]) -> Iterator[str]:
+    """Yield the files that runs and checks read: inputs, files of all steps, and sources of budgets."""
+    yield from (job.input for job in jobs)
+    yield from (name for recipe in book.recipes for step in recipe.steps for name in step.files)
+    config = check_config.read_config(str(book.path))
+    yield from (each.against for each in config.budgets if each.against and "{" not in each.against)
+    for job in jobs if config.budgets else ():
+        path = book.folder / job.output
+        budget = config.budget_of(path)
+        if budget is not None and budget.against:
+            with suppress(UsageError):  # the output itself
+                yield str(config.source_of(path, budget))
+
+
+def _is_plain(folder: Path, name: str) -> bool:
+    """Return whether a name is that of a regular file below the folder, with no link on its way."""
+    path = folder / name
+    try:
+        return stat.S_ISREG(path.lstat().st_mode) and path.resolve() == folder.resolve() / name
+    except (OSError, ValueError):
+        return False
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and number of a file, equal for all its names; None without one."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
+
+
+def _delete(folder: Path, names: Sequence[str], read: Iterable[str]) -> None:
+    """Delete outputs, with buffers that nothing else uses, and folders that become empty. Raises OutputError.
+
+    read: files whose buffers remain.
+    """
+    spared = list(_buffers(folder, read)) if any(map(is_text, names)) else []
+    try:
+        gltf_files.remove([folder / name for name in names], spared)
+    finally:
+        for name in names:
+            with suppress(OSError):  # not empty
+                for above in (folder / name).relative_to(folder).parents[:-1]:
+                    (folder / above).rmdir()
+
+
+def _buffers(folder: Path, names: Iterable[str]) -> Iterator[Path]:
+    for name in filter(is_text, names):
+        with suppress(AnimError):
+            yield from external_files(open_file(str(folder / name)))
