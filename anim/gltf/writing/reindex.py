@@ -9,6 +9,7 @@ from anim.gltf.document import Document, Json, json_array
 from anim.gltf.validation.buffer_layout import DRACO
 from anim.gltf.writing import compaction, references
 from anim.gltf.writing.insertion import empty_views, placeholders
+from anim.gltf.writing.unknown_extensions import whole_number
 
 IndexMaps: TypeAlias = list[int]  # new index by old index
 
@@ -19,8 +20,8 @@ def drop_placeholders(document: Document) -> Document:
     """Return the document without the placeholders that `replace_clips` leaves in accessors and views.
 
     References in meshes, skins, animations, images, sparse accessors, EXT_mesh_gpu_instancing and
-    KHR_draco_mesh_compression are renumbered. If a number in extras or in an unknown extension may be one of the
-    changed indices, nothing is dropped. An unchanged document is returned itself.
+    KHR_draco_mesh_compression are renumbered. If a number or a JSON pointer in an unknown extension may be
+    one of the changed indices, nothing is dropped. An unchanged document is returned itself.
     """
     json = document.json
     if not placeholders(json) and not any(map(compaction.is_placeholder, json_array(json, "bufferViews"))):
@@ -101,7 +102,8 @@ def _map(attributes: Json, accessors: IndexMaps) -> Json:
 
 def _new_index(number: Any, numbers: IndexMaps) -> Any:
     """The new index; invalid ones are unchanged, since extensions are not validated on reading."""
-    return numbers[number] if type(number) is int and 0 <= number < len(numbers) else number
+    index = whole_number(number)
+    return number if index is None or not 0 <= index < len(numbers) else numbers[index]
 
 
 def _animation(animation: Json, accessors: IndexMaps) -> Json:

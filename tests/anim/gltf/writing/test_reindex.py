@@ -78,6 +78,10 @@ def test_a_second_time_there_is_nothing_to_do() -> None:
             {"nodes": [{"extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"SCALE": 3}}}}]},
             "nodes 0 extensions EXT_mesh_gpu_instancing attributes SCALE",
         ),
+        (
+            {"nodes": [{"extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"SCALE": 3.0}}}}]},
+            "nodes 0 extensions EXT_mesh_gpu_instancing attributes SCALE",
+        ),
     ],
 )
 def test_who_names_an_accessor_follows(more: Json, place: str) -> None:
@@ -148,6 +152,9 @@ def test_matrices_of_a_skin_and_sparse_numbers_follow() -> None:
     [
         {"extensions": {"ACME_paths": {"data": [1]}}},
         {"nodes": [{"extensions": {"ACME_paths": 2}}]},
+        {"nodes": [{"extensions": {"ACME_paths": 2.0}}]},
+        {"extensions": {"KHR_interactivity": {"pointer": "/accessors/2"}}},
+        {"extensions": {"KHR_interactivity": {"/bufferViews/2": {}}}},
     ],
 )
 def test_where_an_unknown_number_might_mean_one_nothing_changes(more: Json) -> None:

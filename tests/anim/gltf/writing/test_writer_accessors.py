@@ -62,7 +62,7 @@ def test_numbers_in_known_places_pin_nothing() -> None:
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "spot", "intensity": 1}]}},
         "nodes": [{"extensions": {"KHR_lights_punctual": {"light": 1}}}],
         "extras": {"id": 1, "buffer": 0, "all": [0, {"bufferView": 1}]},
-        "scenes": [{"extensions": {"ACME": {"flag": True, "share": 1.0, "name": "1", "extras": {"id": 1}}}}],
+        "scenes": [{"extensions": {"ACME": {"flag": True, "share": 0.5, "name": "1", "extras": {"id": 1}}}}],
     }
     document = opened(text(animated() | harmless))
     assert len(rewritten(document).json["accessors"]) == 2
