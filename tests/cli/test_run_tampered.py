@@ -112,7 +112,7 @@ def test_a_pipe_as_journal_is_refused(made: Path, call: Call) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no /dev")
-@pytest.mark.parametrize("name", ["/dev/zero", "pipe"])
+@pytest.mark.parametrize("name", ["/dev/zero", "/proc/self/pagemap", "pipe"])
 def test_devices_that_a_record_names_are_not_read(name: str, made: Path, call: Call) -> None:
     os.mkfifo(made / "pipe")
     edit_record(made, files={name: "x"})

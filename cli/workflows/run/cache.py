@@ -17,12 +17,13 @@ from anim.arrays import Bytes
 from anim.errors import OutputError
 from anim.files import special_files
 from cli.workflows.run import own_files
-from cli.workflows.run.stamps import Stamp, is_size, stamp_of
+from cli.workflows.run.stamps import FileStatus, is_size, status_of
 from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
 FORMAT = 1
 HASH = re.compile("[0-9a-f]{64}")
+MAX_HASHED_BYTES = 1 << 32  # longest GLB; a hole in a file may be longer than can be read
 TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# results of `gltf-anim run`: may be deleted\n"
 
 
@@ -52,23 +53,25 @@ class CacheRecord:
 class FileHashes:
     """SHA-256 of files, each read once while it stays the same."""
 
-    _known: dict[str, tuple[Stamp, str]] = field(default_factory=dict)
+    _known: dict[str, tuple[FileStatus, str]] = field(default_factory=dict)
 
     def hash(self, path: str) -> str:
-        """Return the hash of a file, "" if it can't be read.
+        """Return the hash of a file, "" without one.
 
-        That of a device or pipe, which may never end and has other content each time, is equal to no other.
+        That of what can't be read to its end (a device, a pipe, more than 4 GB) is equal to no other.
         """
-        stamp = stamp_of(path)
-        if stamp is None:
+        status = status_of(path)
+        if status is None:
             return ""
         known = self._known.get(path)
-        if known is None or known[0] != stamp:
+        if known is None or known[0] != status:
             try:
+                if status[0] > MAX_HASHED_BYTES:
+                    raise OSError("is too long")
                 with special_files.open_regular(path) as file:
-                    known = stamp, hashlib.file_digest(file, "sha256").hexdigest()
+                    known = status, hashlib.file_digest(file, "sha256").hexdigest()
             except OSError:
-                return os.urandom(32).hex() if special_files.is_device_or_pipe(path) else ""
+                return os.urandom(32).hex()
             self._known[path] = known
         return known[1]
 
