@@ -118,7 +118,8 @@ def command(
         raise UsageError("--delete-stale needs a run of all files and recipes", help="leave out FILE and --recipe")
     book = read_recipes(config)
     folder = _cache_folder(book.folder, cache)
-    record = outputs.read_outputs(folder / outputs.NAME, book.folder)
+    last = journals.read_journal(folder / journals.NAME)
+    record = outputs.read_outputs(folder / outputs.NAME, book.folder, last)
     is_all = not (inputs or recipe)
     try:
         planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
@@ -134,10 +135,12 @@ def command(
         return code
     results = caching.ResultCache(folder)
     results.prepare()
+    if record.unsaved:  # before a new journal is begun
+        record.save(record.unsaved)
     processes = jobs or os.cpu_count() or 1
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
-        journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), resume=resume))
+        journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), last, resume=resume))
         run = RecipeRun(planned, journal, None if no_cache else results, reporter, processes, cluster)
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:
@@ -171,9 +174,10 @@ def _report_stale(
 ) -> None:
     """Name outputs that no recipe makes any more, or delete them, after a run of all files and recipes."""
     stale = record.find_stale([name for job in jobs for name in (job.input, job.output)])
-    if delete:
+    record.save({**record.unsaved, **written})
+    if delete and stale:
         outputs.delete_outputs(record.folder, stale)
-    record.save(written, stale if delete else ())
+        record.save({}, stale)
     if stale:
         names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
         what = "deleted" if delete else "--delete-stale deletes them"

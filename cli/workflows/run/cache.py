@@ -94,7 +94,7 @@ class ResultCache:
     def product(self, record: CacheRecord) -> Bytes | None:
         """Return the GLB of a record; None if it is lost or damaged."""
         try:
-            data = np.frombuffer(own_files.read(self._object(record.product)), np.uint8)
+            data = np.frombuffer(own_files.read(self._object(record.product), MAX_HASHED_BYTES), np.uint8)
         except OSError:
             return None
         return data if hash_of(data) == record.product else None
