@@ -156,7 +156,9 @@ def command(
 def _cache_folder(settings: Path, named: str | None) -> Path:
     """Folder of results and journal. Only a name of the user's own may be a link: another may have come with files."""
     if named is not None:
-        return Path(named).resolve()
+        folder = Path(named).resolve()
+        caching.check_named(folder)
+        return folder
     own_files.check_links(settings, settings / caching.NAME)
     return settings / caching.NAME
 

@@ -10,7 +10,9 @@ import pytest
 
 from cli.workflows.run import own_files
 from cli.workflows.run import run as runs
+from cli.workflows.run.job import Job, JobResult, run_job
 from tests.cli.conftest import Call
+from tests.cli.running import refusal
 from tests.cli.running_recipes import statuses, write_crowd, write_recipe
 
 PLAIN = "resample --fps 12"
@@ -66,9 +68,9 @@ def two_recipes(folder: Path) -> Path:
 def test_two_runs_at_once_keep_the_outputs_and_lines_of_both(
     two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run_job, others = runs.run_job, ["hero"]
+    others = ["hero"]
 
-    def run_another_first(job: runs.Job) -> runs.JobResult:
+    def run_another_first(job: Job) -> JobResult:
         if others:
             call("run", "--recipe", others.pop()).product()
         return run_job(job)
@@ -112,3 +114,23 @@ def test_lines_are_appended_to_what_another_writes(tmp_path: Path) -> None:
         assert path.read_bytes() == (b"a\nb\nc\n" if sys.platform != "win32" else path.read_bytes())
     with own_files.open_for_lines(path, append=False):
         assert path.read_bytes() == b""
+
+
+@pytest.mark.parametrize("tag", ["", "Signature: 8a477f597d28d172789f06886806bc55\n# of another program\n"])
+def test_a_folder_with_other_files_is_no_cache(tag: str, folder: Path, call: Call) -> None:
+    write_recipe(folder, PLAIN)
+    mine = folder / "outputs.json"
+    mine.write_text("mine")
+    if tag:
+        (folder / "CACHEDIR.TAG").write_text(tag)
+    run = call("run", "--cache", ".")
+    assert refusal(run, 2) == f"gltf-anim: --cache: '{folder}' has other files (expected a new folder, or a cache)"
+    assert (mine.read_text(), (folder / ".gitignore").exists()) == ("mine", False)
+
+
+def test_a_new_folder_and_a_cache_may_be_named(folder: Path, call: Call) -> None:
+    write_recipe(folder, PLAIN)
+    (folder / "kept").mkdir()
+    (folder / "kept/.gitkeep").touch()
+    for words in ("1 made", "1 cached"):
+        assert words in call("run", "--cache", "kept").err

@@ -193,8 +193,10 @@ def test_a_wrong_entry_of_outputs_costs_no_other(value: object, made: Path, call
 
 def test_other_files_in_the_folder_of_the_cache_are_not_deleted(made: Path, call: Call) -> None:
     mine = [made / "c/objects/aa/mine.blend", made / f"c/objects/aa/{'b' * 64}"]
-    mine[0].parent.mkdir(parents=True)
+    call("run", "--cache", "c").product()
+    mine[0].parent.mkdir(exist_ok=True)
     for path in mine:
         path.write_bytes(bytes(10_000))
-    assert "1 result" in call("run", "--cache", "c", "--cache-size", "1kB").err
+    write_recipe(made, "resample --fps 6", out="other/{name}")
+    assert "2 results" in call("run", "--cache", "c", "--cache-size", "1kB").err
     assert all(path.exists() for path in mine)

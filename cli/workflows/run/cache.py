@@ -16,6 +16,7 @@ from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import OutputError
 from anim.files import special_files
+from cli.errors import UsageError
 from cli.workflows.run import own_files
 from cli.workflows.run.stamps import FileStatus, is_size, status_of
 from cli.workflows.run.steps import MAKING, Step
@@ -24,6 +25,7 @@ NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
 FORMAT = 1
 HASH = re.compile("[0-9a-f]{64}")
 MAX_HASHED_BYTES = 1 << 32  # longest GLB; a hole in a file may be longer than can be read
+TAG_NAME = "CACHEDIR.TAG"
 TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# results of `gltf-anim run`: may be deleted\n"
 
 
@@ -109,7 +111,7 @@ class ResultCache:
         """Create the folder, ignored by git and by backups. Raises OutputError, also for links in it."""
         for folder in (self.results, self.objects):
             own_files.check_links(self.folder, folder)
-        for name, text in ((".gitignore", "*\n"), ("CACHEDIR.TAG", TAG)):
+        for name, text in ((TAG_NAME, TAG), (".gitignore", "*\n")):  # the tag first: see `check_named`
             if not (self.folder / name).exists():
                 self._write(self.folder / name, np.frombuffer(text.encode(), np.uint8))
 
@@ -138,6 +140,19 @@ class ResultCache:
 
     def _object(self, digest: str) -> Path:
         return self.objects / digest[:2] / digest
+
+
+def check_named(folder: Path) -> None:
+    """Raise UsageError for a folder, named by the user, that has files and is no cache: it may be the project's own."""
+    try:
+        names = os.listdir(folder)
+    except OSError:  # none yet, or what an error is raised for when it is written
+        return
+    is_cache = all(name.startswith(".") for name in names)
+    with suppress(OSError):
+        is_cache = is_cache or b"gltf-anim run" in own_files.read(folder / TAG_NAME)
+    if not is_cache:
+        raise UsageError(f"--cache: '{folder}' has other files (expected a new folder, or a cache)")
 
 
 def recipe_key(steps: tuple[Step, ...], folder: Path, hashes: FileHashes) -> str:
