@@ -27,11 +27,18 @@ def is_device_or_pipe(path: str | Path) -> bool:
 
 
 def open_regular(path: str | Path) -> io.BufferedReader:
-    """Open a regular file for reading. Raises OSError for all others: a pipe is not waited for."""
+    """Open a regular file for reading. Raises OSError for all others: a pipe is not waited for.
+
+    Files of /proc are regular, and without a size; some never end.
+    """
     file = os.fdopen(os.open(path, os.O_RDONLY | BINARY | NO_WAIT), "rb")
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+    try:
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode) or (found.st_size == 0 and file.peek(1)):
+            raise OSError("is no regular file")
+    except BaseException:
         file.close()
-        raise OSError("is no regular file")
+        raise
     return file
 
 

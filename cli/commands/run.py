@@ -119,7 +119,8 @@ def command(
         raise UsageError("--delete-stale needs a run of all files and recipes", help="leave out FILE and --recipe")
     book = read_recipes(config)
     folder = _cache_folder(book.folder, cache)
-    record = outputs.read_outputs(folder / outputs.NAME, book.folder)
+    last = journals.read_journal(folder / journals.NAME)
+    record = outputs.read_outputs(folder / outputs.NAME, book.folder, last)
     is_all, chosen = not (inputs or recipe), chosen_recipes(book, recipe or ())
     try:
         planned = plan_jobs(book, chosen, inputs or (), record, named=bool(recipe))
@@ -138,10 +139,12 @@ def command(
         return code
     results = caching.ResultCache(folder)
     results.prepare()
+    if record.unsaved:  # before a new journal is begun
+        record.save(record.unsaved)
     processes = jobs or os.cpu_count() or 1
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
-        journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), resume=resume))
+        journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), last, resume=resume))
         run = RecipeRun(planned, journal, None if no_cache else results, reporter, processes, cluster)
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:
@@ -157,7 +160,9 @@ def command(
 def _cache_folder(settings: Path, named: str | None) -> Path:
     """Folder of results and journal. Only a name of the user's own may be a link: another may have come with files."""
     if named is not None:
-        return Path(named).resolve()
+        folder = Path(named).resolve()
+        caching.check_named(folder)
+        return folder
     own_files.check_links(settings, settings / caching.NAME)
     return settings / caching.NAME
 

@@ -6,6 +6,8 @@ import glob
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import cache
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -92,16 +94,26 @@ def _fixed_folder(pattern: str) -> str:
 
 
 def matches(path: str, pattern: str) -> bool:
-    """Return whether a path with "/" matches a pattern; "**" stands for any number of folders."""
-    return _match(PurePosixPath(path).parts, PurePosixPath(pattern).parts)
+    """Return whether a path with "/" matches a pattern; "**" stands for any number of folders.
+
+    Each part of the pattern is compared once with each of the path.
+    """
+    parts, ends = PurePosixPath(path).parts, {0}  # numbers of parts that the pattern so far matches
+    for each in _pattern_parts(pattern):
+        if each == "**":
+            ends = set(range(min(ends), len(parts) + 1))
+        else:
+            ends = {end + 1 for end in ends if end < len(parts) and fnmatchcase(parts[end], each)}
+        if not ends:
+            return False
+    return len(parts) in ends
 
 
-def _match(parts: tuple[str, ...], patterns: tuple[str, ...]) -> bool:
-    if not patterns:
-        return not parts
-    if patterns[0] == "**":
-        return _match(parts, patterns[1:]) or (bool(parts) and _match(parts[1:], patterns))
-    return bool(parts) and PurePosixPath(parts[0]).match(patterns[0]) and _match(parts[1:], patterns[1:])
+@cache
+def _pattern_parts(pattern: str) -> tuple[str, ...]:
+    """The parts of a pattern, without a "**" behind another, which adds nothing."""
+    parts = PurePosixPath(pattern).parts
+    return tuple(part for part, before in zip(parts, ("", *parts), strict=False) if (part, before) != ("**", "**"))
 
 
 def nearest(folder: Path) -> CheckConfig:

@@ -18,7 +18,8 @@ NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
 Keys: TypeAlias = Mapping[str, type | tuple[type, ...]]  # allowed keys, and the types of their values
 TYPE_NAMES = {str: "text", bool: "true or false", int: "a whole number", list: "a list", dict: "a table"}
 MAX_INTEGER = 2**63 - 1  # of TOML
-MAX_BYTES = 10_000_000  # of settings, which people write
+MAX_BYTES = 1_000_000  # of settings, which people write
+MAX_KEY_WORK = 10**8  # a key of 10 000 parts, or a [header] of 500 above 20 000 lines: some seconds
 SECTIONS: Keys = {"check": dict, "budget": list, "recipe": list}
 
 
@@ -99,7 +100,20 @@ def _read(path: Path) -> bytes:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise UnsupportedError(f"has more than {MAX_BYTES / 1e6:.0f} MB (settings are short)", where=str(path))
+    if _key_work(data) > MAX_KEY_WORK:
+        raise UnsupportedError("has lines of thousands of dots (keys have a few)", where=str(path))
     return data
+
+
+def _key_work(data: bytes) -> int:
+    """The most that dotted keys may cost: their parts squared, and those of a header for each line below it.
+
+    Each dot of a line counts, also of texts: none has so many.
+    """
+    lines = data.split(b"\n")
+    dots = [line.count(b".") for line in lines]
+    headers = (count for line, count in zip(lines, dots, strict=True) if line.lstrip()[:1] == b"[")
+    return sum(count * count for count in dots) + 10 * max(headers, default=0) * len(lines)
 
 
 def _check_integers(path: Path, where: str, value: object) -> None:

@@ -101,18 +101,44 @@ def test_pipes_in_the_cache_are_as_if_absent(name: str, made: Path, call: Call) 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes")
-def test_a_pipe_as_journal_is_refused(made: Path, call: Call) -> None:
+@pytest.mark.parametrize("args", [(), ("--resume",)])
+def test_a_pipe_as_journal_is_replaced(args: tuple[str, ...], made: Path, call: Call) -> None:
     path = made / CACHE / "journal.jsonl"
     path.unlink()
     os.mkfifo(path)
-    assert "journal.jsonl: can't be written" in refusal(call("run"), 3)
-    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    assert "journal.jsonl: is no regular file" in refusal(call("run", "--resume"), 3)
-    os.close(reader)
+    assert "1 file: 1 cached" in call("run", *args).err
+    assert path.is_file()
+
+
+@pytest.mark.parametrize("name", ["journal.jsonl", "outputs.json"])
+@pytest.mark.parametrize("args", [(), ("--resume",)])
+def test_a_file_with_a_second_name_in_the_cache_is_left_as_it_is(
+    args: tuple[str, ...], name: str, made: Path, call: Call
+) -> None:
+    mine, path = made / "noop.glb", made / CACHE / name
+    before = mine.read_bytes()
+    path.unlink()
+    os.link(mine, path)
+    assert "1 file: 1 " in call("run", *args).err
+    assert mine.read_bytes() == before
+    assert json.loads(path.read_bytes().splitlines()[-1])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no `ulimit -v`")
+@pytest.mark.parametrize(
+    ("name", "args"),
+    [("journal.jsonl", "--resume"), ("outputs.json", ""), ("outputs.json", "--resume"), ("results/*/*", "")],
+)
+def test_a_record_of_gigabytes_is_as_if_absent(name: str, args: str, made: Path) -> None:
+    (path,) = (made / CACHE).glob(name)
+    os.truncate(path, 3_000_000_000)
+    run = shell(f"ulimit -v 3000000; gltf-anim run {args}", made)
+    assert "1 file: 1 " in run.err
+    assert (run.code, path.stat().st_size < 1_000_000) == (0, True)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no /dev")
-@pytest.mark.parametrize("name", ["/dev/zero", "pipe"])
+@pytest.mark.parametrize("name", ["/dev/zero", "/proc/self/pagemap", "pipe"])
 def test_devices_that_a_record_names_are_not_read(name: str, made: Path, call: Call) -> None:
     os.mkfifo(made / "pipe")
     edit_record(made, files={name: "x"})
@@ -167,8 +193,10 @@ def test_a_wrong_entry_of_outputs_costs_no_other(value: object, made: Path, call
 
 def test_other_files_in_the_folder_of_the_cache_are_not_deleted(made: Path, call: Call) -> None:
     mine = [made / "c/objects/aa/mine.blend", made / f"c/objects/aa/{'b' * 64}"]
-    mine[0].parent.mkdir(parents=True)
+    call("run", "--cache", "c").product()
+    mine[0].parent.mkdir(exist_ok=True)
     for path in mine:
         path.write_bytes(bytes(10_000))
-    assert "1 result" in call("run", "--cache", "c", "--cache-size", "1kB").err
+    write_recipe(made, "resample --fps 6", out="other/{name}")
+    assert "2 results" in call("run", "--cache", "c", "--cache-size", "1kB").err
     assert all(path.exists() for path in mine)

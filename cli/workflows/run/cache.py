@@ -16,13 +16,16 @@ from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import OutputError
 from anim.files import special_files
+from cli.errors import UsageError
 from cli.workflows.run import own_files
-from cli.workflows.run.stamps import Stamp, is_size, stamp_of
+from cli.workflows.run.stamps import FileStatus, is_size, status_of
 from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
 FORMAT = 1
 HASH = re.compile("[0-9a-f]{64}")
+MAX_HASHED_BYTES = 1 << 32  # longest GLB; a hole in a file may be longer than can be read
+TAG_NAME = "CACHEDIR.TAG"
 TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# results of `gltf-anim run`: may be deleted\n"
 
 
@@ -52,23 +55,25 @@ class CacheRecord:
 class FileHashes:
     """SHA-256 of files, each read once while it stays the same."""
 
-    _known: dict[str, tuple[Stamp, str]] = field(default_factory=dict)
+    _known: dict[str, tuple[FileStatus, str]] = field(default_factory=dict)
 
     def hash(self, path: str) -> str:
-        """Return the hash of a file, "" if it can't be read.
+        """Return the hash of a file, "" without one.
 
-        That of a device or pipe, which may never end and has other content each time, is equal to no other.
+        That of what can't be read to its end (a device, a pipe, more than 4 GB) is equal to no other.
         """
-        stamp = stamp_of(path)
-        if stamp is None:
+        status = status_of(path)
+        if status is None:
             return ""
         known = self._known.get(path)
-        if known is None or known[0] != stamp:
+        if known is None or known[0] != status:
             try:
+                if status[0] > MAX_HASHED_BYTES:
+                    raise OSError("is too long")
                 with special_files.open_regular(path) as file:
-                    known = stamp, hashlib.file_digest(file, "sha256").hexdigest()
+                    known = status, hashlib.file_digest(file, "sha256").hexdigest()
             except OSError:
-                return os.urandom(32).hex() if special_files.is_device_or_pipe(path) else ""
+                return os.urandom(32).hex()
             self._known[path] = known
         return known[1]
 
@@ -91,7 +96,7 @@ class ResultCache:
     def product(self, record: CacheRecord) -> Bytes | None:
         """Return the GLB of a record; None if it is lost or damaged."""
         try:
-            data = np.frombuffer(own_files.read(self._object(record.product)), np.uint8)
+            data = np.frombuffer(own_files.read(self._object(record.product), MAX_HASHED_BYTES), np.uint8)
         except OSError:
             return None
         return data if hash_of(data) == record.product else None
@@ -106,7 +111,7 @@ class ResultCache:
         """Create the folder, ignored by git and by backups. Raises OutputError, also for links in it."""
         for folder in (self.results, self.objects):
             own_files.check_links(self.folder, folder)
-        for name, text in ((".gitignore", "*\n"), ("CACHEDIR.TAG", TAG)):
+        for name, text in ((TAG_NAME, TAG), (".gitignore", "*\n")):  # the tag first: see `check_named`
             if not (self.folder / name).exists():
                 self._write(self.folder / name, np.frombuffer(text.encode(), np.uint8))
 
@@ -135,6 +140,19 @@ class ResultCache:
 
     def _object(self, digest: str) -> Path:
         return self.objects / digest[:2] / digest
+
+
+def check_named(folder: Path) -> None:
+    """Raise UsageError for a folder, named by the user, that has files and is no cache: it may be the project's own."""
+    try:
+        names = os.listdir(folder)
+    except OSError:  # none yet, or what an error is raised for when it is written
+        return
+    is_cache = all(name.startswith(".") for name in names)
+    with suppress(OSError):
+        is_cache = is_cache or b"gltf-anim run" in own_files.read(folder / TAG_NAME)
+    if not is_cache:
+        raise UsageError(f"--cache: '{folder}' has other files (expected a new folder, or a cache)")
 
 
 def recipe_key(steps: tuple[Step, ...], folder: Path, hashes: FileHashes) -> str:

@@ -28,7 +28,7 @@ from cli.streams import StepStreams, use_streams
 from cli.text import Reporter
 from cli.workflows.run.cache import FileHashes, ResultCache
 from cli.workflows.run.places import check_output
-from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
+from cli.workflows.run.stamps import FileStatus, Stamp, stamp_files, stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import Step
 
 EMPTY: Bytes = np.empty(0, np.uint8)
@@ -40,7 +40,8 @@ class Job:
     """A file with its steps.
 
     folder: of the settings, from which input and output count. cores: processes that a step may use.
-    cache: folder of results, if they are kept, and the key of this one. version: of the tool that plans the job.
+    cache: folder of results, if they are kept, and the key of this one. status: of the input, whose content is in the
+    key. version: of the tool that plans the job.
     """
 
     folder: Path
@@ -50,6 +51,7 @@ class Job:
     cores: int = 1
     cache: Path | None = None
     key: str = ""
+    status: FileStatus | None = None
     version: str = __version__
 
 
@@ -58,7 +60,8 @@ class JobResult:
     """Result of a job. code: exit code. messages: lines of the steps, errors last. size: bytes of the output.
 
     stamp: size and modification time of the input when the job began. seconds: of work. input_size: bytes of the input
-    with its buffers, as `size` has those of the output. files: stamps by path of all other files read and written.
+    with its buffers, as `size` has those of the output. files: stamps by path of all other files read and written; None
+    if one that was read was changed meanwhile, so that nobody knows which content the output is of.
     """
 
     code: int
@@ -67,24 +70,25 @@ class JobResult:
     stamp: Stamp | None = None
     seconds: float = 0.0
     input_size: int = 0
-    files: Mapping[str, Stamp | None] = field(default_factory=dict)
+    files: Mapping[str, Stamp | None] | None = field(default_factory=dict)
 
 
 def run_job(job: Job) -> JobResult:
     """Run the steps of a file, and write its output; errors are reported in the result."""
-    began = time.perf_counter()
+    began, began_ns = time.perf_counter(), time.time_ns()
     stamp = stamp_of(job.folder / job.input)
     streams = StepStreams(job.input, EMPTY, job.folder)
-    size, others = 0, dict[str, Stamp | None]()
+    size = 0
+    others: dict[str, Stamp | None] | None = None
 
     def work() -> int:
         nonlocal size, others
         _check_version(job.version)
         code, files, product = run_steps(job, streams)
         if code == errors.DONE:
-            if job.cache is not None and stamp == stamp_of(job.folder / job.input):  # else of other bytes than its key
-                store(job, product, files)
-            size, others = write_output(job, product, files)
+            if job.cache is not None:
+                store(job, product, files, began_ns)
+            size, others = write_output(job, product, files, began_ns)
         return code
 
     with use_streams(streams):
@@ -131,27 +135,35 @@ def run_steps(job: Job, messages: StepStreams) -> tuple[int, list[Path], Bytes]:
     return errors.DONE, files, data
 
 
-def store(job: Job, product: Bytes, files: Sequence[Path]) -> None:
-    """Keep the result in the cache, with the hashes of all files that were read besides the input."""
+def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int) -> None:
+    """Keep the result in the cache, with the hashes of all files that were read besides the input.
+
+    Not if the input was changed since its key was made, or another file since the steps began, a time in ns: the result
+    may be that of other content.
+    """
     hashes = FileHashes()
     others = {os.path.relpath(path, job.folder): hashes.hash(str(path)) for path in files}
     others.pop(os.path.normpath(job.input), None)
+    if status_of(job.folder / job.input) != job.status or stamp_read(job.folder, others, began_ns) is None:
+        return
     document = container.read(product)
     is_plain = not any(images.external_uri(image) for image in json_array(document.json, "images"))
     assert job.cache is not None
     ResultCache(job.cache).store(job.key, product, others, is_plain=is_plain)
 
 
-def write_output(job: Job, product: Bytes, read: Iterable[str | Path]) -> tuple[int, dict[str, Stamp | None]]:
+def write_output(
+    job: Job, product: Bytes, read: Iterable[str | Path], began_ns: int
+) -> tuple[int, dict[str, Stamp | None] | None]:
     """Write the GLB of the last step as the output, with external images copied beside it.
 
     read: files that the steps read, which stay when those of a replaced .gltf are removed. The same bytes are not
-    written again. Returns the output's size in bytes, and the stamps of all files of the job besides input and output.
-    Raises AnimError.
+    written again. Returns the output's size in bytes, and the stamps of all files of the job besides input and output;
+    None if one that was read, or the input, was changed since a time in ns. Raises AnimError.
     """
     with atomic.name_errors(Path(job.output)):  # as while somebody exchanges a folder with a link
-        read = [job.folder / each for each in read]
-        return _write(job, product, read), _stamp_companions(job, product, read)
+        paths = [job.folder / each for each in read]
+        return _write(job, product, paths), _stamp_companions(job, product, paths, began_ns)
 
 
 def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
@@ -185,14 +197,18 @@ def _as_the_last_step_writes(job: Job, document: Document) -> Document:
     return container.embed_buffers(document) if is_embedding else document
 
 
-def _stamp_companions(job: Job, product: Bytes, read: Sequence[Path]) -> dict[str, Stamp | None]:
+def _stamp_companions(job: Job, product: Bytes, read: Sequence[Path], began_ns: int) -> dict[str, Stamp | None] | None:
     """Stamps of the files that the steps read, and of buffers and images of input and output.
 
-    product: GLB of the last step, whose images come from the input's folder.
+    product: GLB of the last step, whose images come from the input's folder. None if a file that was read, or the
+    input, was changed since a time in ns.
     """
     images = list(external_files(open_bytes(product, job.output)._replace(folder=(job.folder / job.input).parent)))
     written = external_files(open_file(str(job.folder / job.output))) if images or is_text(job.output) else ()
-    stamps = stamp_files(job.folder, [*read, *images, *written])
+    others = stamp_read(job.folder, [job.input, *read, *images], began_ns)
+    if others is None:
+        return None
+    stamps = {**others, **stamp_files(job.folder, written)}
     return {path: stamp for path, stamp in stamps.items() if path not in map(os.path.normpath, (job.input, job.output))}
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from anim import __version__
 from anim.files.stream import write_stream
@@ -42,13 +42,19 @@ class JournalEntry:
     messages: tuple[str, ...] = ()
 
 
+Entries: TypeAlias = Mapping[tuple[str, str], JournalEntry]  # the last ones, by input and output
+
+
 @dataclass
 class Journal:
-    """Journal that a run writes; a line is complete in the file as soon as it is written."""
+    """Journal that a run writes; a line is complete in the file as soon as it is written.
+
+    earlier: entries of the run that is resumed.
+    """
 
     path: Path
     file: io.FileIO
-    earlier: dict[tuple[str, str], JournalEntry] = field(default_factory=dict)
+    earlier: Entries
 
     def write(self, entry: JournalEntry) -> None:
         """Append a line."""
@@ -71,18 +77,21 @@ class Journal:
 
 
 @contextmanager
-def open_journal(path: Path, files: int, *, resume: bool) -> Iterator[Journal]:
-    """Open the journal of a run. resume: append to that of the last run, else begin a new one. Raises OutputError."""
-    earlier = read_journal(path) if resume else {}
+def open_journal(path: Path, files: int, last: Entries, *, resume: bool) -> Iterator[Journal]:
+    """Open the journal of a run. Raises OutputError.
+
+    resume: append to that of the last run, with its entries, else begin a new one; while another run writes there, both
+    have one.
+    """
     with own_files.open_for_lines(path, append=resume) as file:
-        journal = Journal(path, file, earlier)
+        journal = Journal(path, file, last if resume else {})
         if resume:
             write_stream(file, [b"\n"], str(path))  # ends a line that was cut off
         journal.write_line({"run": {"version": __version__, "files": files, "resumed": resume}})
         yield journal
 
 
-def read_journal(path: Path) -> dict[tuple[str, str], JournalEntry]:
+def read_journal(path: Path) -> Entries:
     """Return the last entry of each input and output; none without a journal. Lines that are cut off are skipped."""
     entries: dict[tuple[str, str], JournalEntry] = {}
     try:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import io
 import os
-import stat
 from pathlib import Path
 
 from anim.arrays import Bytes
 from anim.errors import OutputError
-from anim.files import atomic, special_files
+from anim.files import atomic, file_lock, special_files
+from anim.files.folder_lock import lock_folder
 
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # Windows has none
 HELP = "delete it, or name another folder with --cache"
+MAX_TEXT_BYTES = 100_000_000  # of the journal and of the records: those of 100 000 files have half of it
 
 
-def read(path: Path) -> bytes:
-    """Return the bytes of a regular file. Raises OSError for all others."""
+def read(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
+    """Return the bytes of a regular file of at most `most`. Raises OSError for all others: a hole has any length."""
     with special_files.open_regular(path) as file:
+        if os.fstat(file.fileno()).st_size > most:
+            raise OSError("is too long")
         return file.read()
 
 
@@ -32,21 +35,32 @@ def write(folder: Path, path: Path, data: Bytes) -> None:
 
 
 def open_for_lines(path: Path, *, append: bool) -> io.FileIO:
-    """Open a file of a cache's folder for writing, unbuffered: closing it writes nothing. Raises OutputError."""
+    """Open a file of a cache's folder to append lines, unbuffered: closing it writes nothing. Raises OutputError.
+
+    append: to the lines that are there; else to a new file, but for lines that another process still appends. What may
+    not be the cache's own, as a file with a second name, is never written into: the new one takes its place.
+    """
     check_links(path.parent, path)
-    flags = os.O_WRONLY | os.O_CREAT | NO_LINK | special_files.NO_WAIT | (os.O_APPEND if append else 0)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_LINK | special_files.NO_WAIT | getattr(os, "O_CLOEXEC", 0)
     with atomic.name_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = io.FileIO(path, "w", opener=lambda name, _: os.open(name, flags | getattr(os, "O_CLOEXEC", 0), 0o666))
-        try:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise OutputError(f"{path}: is no regular file", help=HELP)
-            if not append:
-                file.truncate(0)
-        except BaseException:
-            file.close()
-            raise
+        with lock_folder(path.parent):
+            if not _is_continued(path, append=append):
+                path.unlink(missing_ok=True)
+            file = io.FileIO(path, "w", opener=lambda name, _: os.open(name, flags, 0o666))
+            file_lock.lock(file)
     return file
+
+
+def _is_continued(path: Path, *, append: bool) -> bool:
+    """Return whether lines are appended to the file that is there."""
+    try:
+        with special_files.open_regular(path) as file:
+            found = os.fstat(file.fileno())
+            is_own = found.st_nlink == 1 and found.st_size <= MAX_TEXT_BYTES
+            return is_own and (append or file_lock.is_locked(file))
+    except OSError:
+        return False
 
 
 def check_links(folder: Path, path: Path) -> None:

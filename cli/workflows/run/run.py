@@ -30,7 +30,7 @@ from cli.workflows.run.job import (
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
 from cli.workflows.run.order import group_jobs, keys_read
 from cli.workflows.run.places import output_key
-from cli.workflows.run.stamps import Stamp, stamp_files, stamp_of
+from cli.workflows.run.stamps import Stamp, stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import Step
 from cli.workflows.run.workers import local_pool, run_jobs
 
@@ -108,9 +108,11 @@ class RecipeRun:
             elif self.cache is None:
                 yield job
             else:
-                digest = self._hashes.hash(os.path.join(job.folder, job.input))
-                keyed = replace(job, cache=self.cache.folder, key=result_key(recipe, job.steps, job.input, digest))
-                found = self._from_cache(keyed, self.cache)
+                began_ns, path = time.time_ns(), os.path.join(job.folder, job.input)
+                status, digest = status_of(path), self._hashes.hash(path)  # in this order
+                key = result_key(recipe, job.steps, job.input, digest)
+                keyed = replace(job, cache=self.cache.folder, key=key, status=status)
+                found = self._from_cache(keyed, self.cache, began_ns)
                 if found is None:
                     yield keyed
                 else:
@@ -124,8 +126,11 @@ class RecipeRun:
         failed, code = self._failed[key]
         return JobResult(code, (f"{errors.PROGRAM}: {job.input}: its steps read '{failed}', which was not made",))
 
-    def _from_cache(self, job: Job, cache: ResultCache) -> JobResult | None:
-        """The result of a job from the cache, with its output written; None if there is none."""
+    def _from_cache(self, job: Job, cache: ResultCache, began_ns: int) -> JobResult | None:
+        """The result of a job from the cache, with its output written; None if there is none.
+
+        began_ns: time before its key was made.
+        """
         began = time.perf_counter()
         record = cache.find(job.key, job.folder, self._hashes)
         if record is None:
@@ -134,17 +139,20 @@ class RecipeRun:
         stamp = stamp_of(job.folder / job.input)
         output = os.path.join(job.folder, job.output)
         if record.is_plain and not is_text(output) and self._hashes.hash(output) == record.product:
-            others = stamp_files(job.folder, record.files)
+            others = stamp_read(job.folder, [job.input, *record.files], began_ns)
+            if others is not None:
+                others.pop(os.path.normpath(job.input))
             return JobResult(errors.DONE, (), record.size, stamp, 0.0, input_size(job), others)
         product = cache.product(record)
         if product is None:
             return None
         streams = StepStreams(job.input, EMPTY, job.folder)
-        size, files = 0, dict[str, Stamp | None]()
+        size = 0
+        files: dict[str, Stamp | None] | None = None
 
         def write() -> None:
             nonlocal size, files
-            size, files = write_output(job, product, record.files)
+            size, files = write_output(job, product, record.files, began_ns)
 
         with use_streams(streams):
             code = run_guarded(write)
@@ -177,7 +185,7 @@ class RecipeRun:
                 result.size,
                 result.stamp,
                 None if status == FAILED else stamp_of(job.folder / job.output),
-                dict(result.files),
+                None if result.files is None else dict(result.files),
                 result.messages if status == FAILED else tuple(filter(is_notice, result.messages)),
             )
         )

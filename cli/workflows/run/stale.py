@@ -36,9 +36,10 @@ def report_stale(
     Raises OutputError, and UsageError for settings of budgets that are wrong.
     """
     stale = find_stale(record, book, jobs)
-    if delete:
+    record.save({**record.unsaved, **written})
+    if delete and stale:
         _delete(record.folder, stale, _files_read(book, jobs))
-    record.save(written, stale if delete else ())
+        record.save({}, stale)
     if stale:
         names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
         what = "deleted" if delete else "--delete-stale deletes them"

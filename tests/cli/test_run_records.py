@@ -1,0 +1,136 @@
+"""Records of outputs and the journal of `run`, where a run is ended, fails at its end, or isn't alone."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from cli.workflows.run import own_files
+from cli.workflows.run import run as runs
+from cli.workflows.run.job import Job, JobResult, run_job
+from tests.cli.conftest import Call
+from tests.cli.running import refusal
+from tests.cli.running_recipes import statuses, write_crowd, write_recipe
+
+PLAIN = "resample --fps 12"
+CACHE = ".gltf-anim-cache"
+
+
+def recorded(folder: Path) -> set[str]:
+    """Outputs in the record."""
+    return set(json.loads((folder / CACHE / "outputs.json").read_text())["folders"][str(folder)])
+
+
+@pytest.fixture
+def ended(folder: Path, call: Call) -> Path:
+    """A folder with a run that was ended before it could save its outputs, of which one input is deleted since."""
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, PLAIN, match="crowd/*.glb", out="crowd/{stem}.small.glb")
+    call("run").product()
+    (folder / CACHE / "outputs.json").unlink()
+    (folder / "crowd/arm 1.glb").unlink()
+    return folder
+
+
+@pytest.mark.parametrize("args", [(), ("--resume",), ("crowd/hero.glb",)])
+def test_outputs_of_a_run_that_was_ended_are_found(args: tuple[str, ...], ended: Path, call: Call) -> None:
+    call("run", *args).product()
+    call("run").product()  # which begins a new journal
+    assert recorded(ended) == {"crowd/hero.small.glb", "crowd/arm 1.small.glb"}
+    assert "note: no recipe makes 1 output of earlier runs any more" in call("run", "--delete-stale").err
+    assert sorted(path.name for path in (ended / "crowd").iterdir()) == ["hero.glb", "hero.small.glb"]
+
+
+def test_outputs_of_a_run_that_was_ended_are_found_without_any_input(ended: Path, call: Call) -> None:
+    (ended / "crowd/hero.glb").unlink()
+    assert call("run", "--delete-stale").code == 5
+    assert not (ended / "crowd").exists()
+
+
+def test_what_was_changed_after_a_run_that_was_ended_is_no_output_of_it(ended: Path, call: Call) -> None:
+    (ended / "crowd/arm 1.small.glb").write_bytes((ended / "noop.glb").read_bytes())
+    assert "2 files: 1 made, 1 cached" in call("run", "--delete-stale").err
+    assert statuses(ended)["crowd/arm 1.small.glb"] == "made"
+
+
+@pytest.fixture
+def two_recipes(folder: Path) -> Path:
+    """A folder with two recipes, each for one file."""
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, PLAIN, match="crowd/arm 1.glb", name="arm")
+    write_recipe(folder, PLAIN, match="crowd/hero.glb", name="hero")
+    return folder
+
+
+def test_two_runs_at_once_keep_the_outputs_and_lines_of_both(
+    two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    others = ["hero"]
+
+    def run_another_first(job: Job) -> JobResult:
+        if others:
+            call("run", "--recipe", others.pop()).product()
+        return run_job(job)
+
+    monkeypatch.setattr(runs, "run_job", run_another_first)
+    call("run", "--recipe", "arm").product()
+    assert recorded(two_recipes) == {"build/crowd/arm 1.glb", "build/crowd/hero.glb"}
+    if sys.platform != "win32":  # which has no locks
+        assert statuses(two_recipes) == {"crowd/arm 1.glb": "made", "crowd/hero.glb": "made"}
+    assert "2 files: 2 done before" in call("run", "--resume").err
+    call("run", "--recipe", "arm").product()
+    assert statuses(two_recipes) == {"crowd/arm 1.glb": "cached"}
+
+
+def test_outputs_are_recorded_before_stale_ones_are_deleted(
+    two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call("run").product()
+    (two_recipes / "crowd/arm 1.glb").rename(two_recipes / "crowd/arm 2.glb")
+    write_recipe(two_recipes, PLAIN, match="crowd/arm 2.glb", out="other/{name}")
+    output = two_recipes / "build/crowd/arm 1.glb"
+    unlink = Path.unlink
+
+    def refuse(path: Path, missing_ok: bool = False) -> None:
+        if path == output:
+            raise PermissionError(13, "Permission denied")
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    run = call("run", "--delete-stale")
+    assert "arm 1.glb: can't be written (permission denied)" in run.err
+    assert recorded(two_recipes) == {"build/crowd/arm 1.glb", "build/crowd/hero.glb", "other/arm 2.glb"}
+
+
+def test_lines_are_appended_to_what_another_writes(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    with own_files.open_for_lines(path, append=False) as first:
+        with own_files.open_for_lines(path, append=False) as second:
+            for file, line in ((first, b"a\n"), (second, b"b\n"), (first, b"c\n")):
+                file.write(line)
+        assert path.read_bytes() == (b"a\nb\nc\n" if sys.platform != "win32" else path.read_bytes())
+    with own_files.open_for_lines(path, append=False):
+        assert path.read_bytes() == b""
+
+
+@pytest.mark.parametrize("tag", ["", "Signature: 8a477f597d28d172789f06886806bc55\n# of another program\n"])
+def test_a_folder_with_other_files_is_no_cache(tag: str, folder: Path, call: Call) -> None:
+    write_recipe(folder, PLAIN)
+    mine = folder / "outputs.json"
+    mine.write_text("mine")
+    if tag:
+        (folder / "CACHEDIR.TAG").write_text(tag)
+    run = call("run", "--cache", ".")
+    assert refusal(run, 2) == f"gltf-anim: --cache: '{folder}' has other files (expected a new folder, or a cache)"
+    assert (mine.read_text(), (folder / ".gitignore").exists()) == ("mine", False)
+
+
+def test_a_new_folder_and_a_cache_may_be_named(folder: Path, call: Call) -> None:
+    write_recipe(folder, PLAIN)
+    (folder / "kept").mkdir()
+    (folder / "kept/.gitkeep").touch()
+    for words in ("1 made", "1 cached"):
+        assert words in call("run", "--cache", "kept").err
