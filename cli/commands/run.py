@@ -23,9 +23,10 @@ from cli.workflows.run import journal as journals
 from cli.workflows.run import outputs, own_files
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
-from cli.workflows.run.plan import plan_jobs
+from cli.workflows.run.job import Job
+from cli.workflows.run.plan import explain_unused, plan_jobs
 from cli.workflows.run.prune import prune
-from cli.workflows.run.recipe import chosen_recipes, read_recipes
+from cli.workflows.run.recipe import Recipe, RecipeBook, chosen_recipes, read_recipes
 from cli.workflows.run.run import RecipeRun
 from cli.workflows.run.stale import report_stale
 
@@ -100,7 +101,8 @@ def command(
         out = "build/{path}"
 
     match, out and files named in steps are relative to the folder of the settings. out takes {path}, {folder}, {name}
-    and {stem} (the name without extension). For two recipes with the same output the first counts.
+    and {stem} (the name without extension). For two recipes with the same output the first counts. Outputs are no
+    inputs of recipes, but steps may name them: these are made first.
 
     Results are kept by the content of the input and of the files that steps name, by the steps, and by the version of
     this tool: a second run makes nothing again. --resume continues a run that was interrupted, by its journal.
@@ -118,13 +120,16 @@ def command(
     book = read_recipes(config)
     folder = _cache_folder(book.folder, cache)
     record = outputs.read_outputs(folder / outputs.NAME, book.folder)
-    is_all = not (inputs or recipe)
+    is_all, chosen = not (inputs or recipe), chosen_recipes(book, recipe or ())
     try:
-        planned = plan_jobs(book, chosen_recipes(book, recipe or ()), inputs or (), record, named=bool(recipe))
+        planned = plan_jobs(book, chosen, inputs or (), record, named=bool(recipe))
     except NotFoundError:  # as after all inputs were deleted
+        _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
             report_stale(record, book, (), {}, reporter, delete=delete_stale)
         raise
+    if not inputs:
+        _warn_of_unused(book, chosen, planned, record, reporter)
     if emit is not None:
         readable, code = readable_jobs(planned)
         if readable:
@@ -155,6 +160,13 @@ def _cache_folder(settings: Path, named: str | None) -> Path:
         return Path(named).resolve()
     own_files.check_links(settings, settings / caching.NAME)
     return settings / caching.NAME
+
+
+def _warn_of_unused(
+    book: RecipeBook, chosen: Sequence[Recipe], jobs: Sequence[Job], record: outputs.OutputRecord, reporter: Reporter
+) -> None:
+    for line in explain_unused(book, chosen, jobs, record):
+        reporter.warn(line)
 
 
 def _prune(results: caching.ResultCache, limit: int, reporter: Reporter) -> None:

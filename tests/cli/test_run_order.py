@@ -57,3 +57,21 @@ def test_outputs_that_need_each_other_are_refused(folder: Path, call: Call) -> N
         write_recipe(folder, f"from-euler --onto {other}.glb", match=f"{name}.bvh", out="{stem}.glb")
     words = "'a.glb' and 'b.glb' can't be made: steps read the output of each other"
     assert words in refusal(call("run"), 2)
+
+
+def test_a_recipe_that_matches_only_outputs_of_others_is_a_warning(folder: Path, call: Call) -> None:
+    """It was skipped without a word."""
+    write_recipe(folder, PLAIN, match="noop.glb", out="b.glb", name="first")
+    write_recipe(folder, PLAIN, match="b.glb", out="c.glb", name="next")
+    write_recipe(folder, PLAIN, match="none/*.glb", out="d/{path}", name="none")
+    write_recipe(folder, PLAIN, match="*.glb", out="{stem}-small.glb", name="beside")
+    line = "warning: recipe 'next' makes nothing: it matches only outputs of others ('b.glb'), which "
+    for _ in range(2):
+        run = call("run", "-q")
+        assert (run.code, run.err.count("makes nothing")) == (0, 1)
+        assert line in run.err
+    run = call("run", "--recipe", "next")
+    assert run.code == 5
+    assert line in run.err
+    assert "1 file: 1 made" in call("run", "--recipe", "next", "b.glb").err
+    assert "makes nothing" not in call("run", "b.glb").err

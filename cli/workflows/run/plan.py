@@ -28,7 +28,8 @@ def plan_jobs(
     files: paths, folders and patterns, from the working folder; empty for all files below the folder of the settings.
     earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
     named: whether the recipes are named by the command line: then files need not match.
-    Outputs are never inputs. Raises UsageError for two files with one output, and NotFoundError without any file.
+    Outputs are never inputs: "*.glb" would match those beside their inputs. Raises UsageError for two files with one
+    output, and NotFoundError without any file.
     """
     given = [_relative(book, each) for each in input_files.expand(files)]
     jobs: dict[str, Job] = {}
@@ -49,6 +50,23 @@ def plan_jobs(
         return [job for group in group_jobs(chosen) for job in group]
     except UsageError as error:
         raise UsageError(f"{book.path}: {error}") from None
+
+
+def explain_unused(
+    book: RecipeBook, recipes: Sequence[Recipe], jobs: Sequence[Job], earlier: OutputRecord
+) -> Iterator[str]:
+    """Yield a line for each recipe that makes nothing since it matches only outputs of others, which are no inputs."""
+    outputs = dict.fromkeys(job.output for job in jobs)
+    for recipe in recipes:
+        if any(job.steps is recipe.steps for job in jobs):
+            continue
+        others, own = [each for each in book.recipes if each is not recipe], _fixed_folder(recipe.out, "{")
+        found = (name for name in {**outputs, **earlier.outputs} if matches(name, recipe.match))
+        outside = (name for name in found if not own or not PurePosixPath(name).is_relative_to(own))
+        name = next((each for each in outside if each in outputs or earlier.is_product(each, others)), "")
+        if name and not any(matches(job.input, recipe.match) for job in jobs):
+            problem = f"recipe '{recipe.name}' makes nothing: it matches only outputs of others ('{name}')"
+            yield f"{problem}, which are no inputs: put all steps of a file into one recipe"
 
 
 def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
