@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import sys
 from pathlib import Path
@@ -9,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from anim.errors import OutputError
+from anim.gltf.io.source import open_file
 from cli.workflows.run.job import Job
 from cli.workflows.run.places import check_output
 from tests.cli.conftest import Call
@@ -59,6 +62,57 @@ def test_a_link_made_during_the_run_is_found_before_writing(folder: Path) -> Non
     (folder / "build").symlink_to(".")
     with pytest.raises(OutputError, match="its own output"):
         check_output(job)
+
+
+def test_copies_of_images_stay_in_the_folder(
+    folder: Path, call: Call, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """They were written outside, through a link beside the output."""
+    outside = tmp_path_factory.mktemp("outside")
+    call("convert", "crowd/arm 1.glb", "crowd/arm.gltf").product()
+    path = folder / "crowd/arm.gltf"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "images": [{"uri": "tex/skin.png"}]}))
+    for name in ("crowd/tex", "build", "within"):
+        (folder / name).mkdir()
+    (folder / "crowd/tex/skin.png").write_bytes(b"\x89PNG")
+    write_recipe(folder, PLAIN, match="crowd/*.gltf", out="build/{name}")
+    (folder / "build/tex").symlink_to(outside)
+    run = call("run")
+    assert run.code == 3
+    assert f"build/tex/skin.png: leads out of '{folder}' by a link" in run.err
+    assert list(outside.iterdir()) == []
+    assert not (folder / "build/arm.gltf").exists()
+    (outside / "skin.png").write_bytes(b"\x89PNG")  # then nothing is written there
+    assert "1 file: 1 cached" in call("run").err
+    (folder / "build/tex").unlink()
+    (folder / "build/tex").symlink_to("../within")
+    assert "1 file: 1 cached" in call("run").err
+    assert (folder / "within/skin.png").exists()
+
+
+def fail(*args: object, **options: object) -> Path:
+    """Fail as the system does for what was a link a moment before."""
+    raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+
+
+def test_a_folder_that_is_exchanged_with_a_link_is_one_line(
+    folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was a traceback."""
+    write_recipe(folder, PLAIN)
+    monkeypatch.setattr("cli.workflows.run.job.check_output", fail)
+    run = call("run", "--no-cache")
+    assert run.code == 3
+    assert "\ngltf-anim: build/crowd/arm 1.glb: can't be written (" in run.err
+
+
+def test_a_folder_that_can_not_be_looked_up_is_an_error_of_the_output(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = open_file(str(folder / "noop.glb"))
+    monkeypatch.setattr(Path, "resolve", fail)
+    with pytest.raises(OutputError, match=r"noop\.glb: can't be written"):
+        source.is_in_folder("build/noop.glb")
 
 
 @pytest.mark.parametrize(

@@ -32,16 +32,28 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
     return changed, copies
 
 
-def write_copies(copies: Mapping[Path, Bytes]) -> None:
-    """Write images to free names; an existing file there has the same bytes. Raises OutputError."""
+def write_copies(copies: Mapping[Path, Bytes], within: Path | None = None) -> None:
+    """Write images to free names; an existing file there has the same bytes. Raises OutputError.
+
+    within: a folder that none of them may leave by a link.
+    """
     if copies:
         before_commit.run_job()
+    if within is not None:
+        for path in copies:
+            _check_place(path, within)
     for path, data in copies.items():
         with atomic.name_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             if not path.exists():
                 with atomic.temporary_files() as made:
                     atomic.move_to_free(atomic.write_temporary(path, [data], made), path)
+
+
+def _check_place(path: Path, folder: Path) -> None:
+    with atomic.name_errors(path):
+        if not path.exists() and not path.resolve().is_relative_to(folder.resolve()):
+            raise OutputError(f"{path}: leads out of '{folder}' by a link")
 
 
 def embed(document: Document, folder: Path | None) -> Document:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
-from anim.errors import FormatError
+from anim.errors import FormatError, not_written
 from anim.files import resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, json_text, uri
@@ -33,9 +33,16 @@ class Source(NamedTuple):
     data: Bytes
 
     def is_in_folder(self, output: str) -> bool:
-        """Return True if `output` is in the same folder, so that relative URIs remain valid."""
-        folder = resolver.resolve_links(Path(output)).parent
-        return self.folder is not None and folder.resolve() == self.folder.resolve()
+        """Return True if `output` is in the same folder, so that relative URIs remain valid.
+
+        Raises OutputError if its folder can't be looked up, as while it is exchanged with a link.
+        """
+        if self.folder is None:
+            return False
+        try:
+            return resolver.resolve_links(Path(output)).parent.resolve() == self.folder.resolve()
+        except OSError as error:
+            raise not_written(output, error) from None
 
     def bytes_of(self, document: Document) -> Bytes | None:
         """Return the input's bytes if the document is unchanged since it was read, else None."""
@@ -92,6 +99,7 @@ def write_file(
     *,
     unchanged: Bytes | None = None,
     spared: Sequence[Path] = (),
+    within: Path | None = None,
     dry_run: bool = False,
     note: Note = lambda words: None,
 ) -> int:
@@ -102,7 +110,8 @@ def write_file(
     In another folder images are copied to the output's folder, and no file is overwritten. Files are written
     atomically, and only if their bytes differ from the existing ones; otherwise only the modification time of the file
     at `path` is updated. unchanged: the input's bytes of the same content (`Source.bytes_of`), written instead of new
-    ones where possible. spared: more files that are never removed.
+    ones where possible. spared: more files that are never removed. within: a folder that no copy of an image may leave
+    by a link.
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
     from anim.files import atomic
@@ -113,7 +122,7 @@ def write_file(
         document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
     if not dry_run:
-        images.write_copies(copies)
+        images.write_copies(copies, within)
     if not path.lower().endswith(".gltf"):
         content = glb_chunks(document, unchanged)
         if not dry_run:

@@ -16,6 +16,7 @@ import numpy as np
 from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import AnimError, UnsupportedError, not_written
+from anim.files import atomic
 from anim.gltf.document import json_array
 from anim.gltf.io import container, images
 from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
@@ -82,8 +83,7 @@ def run_job(job: Job) -> JobResult:
         if code == errors.DONE:
             if job.cache is not None and stamp == stamp_of(job.folder / job.input):  # else of other bytes than its key
                 store(job, product, files)
-            size = write_output(job, product, files)
-            others = stamp_companions(job, product, files)
+            size, others = write_output(job, product, files)
         return code
 
     with use_streams(streams):
@@ -141,12 +141,19 @@ def store(job: Job, product: Bytes, files: Sequence[Path]) -> None:
     ResultCache(job.cache).store(job.key, product, others, is_plain=is_plain)
 
 
-def write_output(job: Job, product: Bytes, read: Iterable[str | Path]) -> int:
-    """Write the GLB of the last step as the output, with external images copied beside it; return its size in bytes.
+def write_output(job: Job, product: Bytes, read: Iterable[str | Path]) -> tuple[int, dict[str, Stamp | None]]:
+    """Write the GLB of the last step as the output, with external images copied beside it.
 
     read: files that the steps read, which stay when those of a replaced .gltf are removed. The same bytes are not
-    written again. Raises AnimError.
+    written again. Returns the output's size in bytes, and the stamps of all files of the job besides input and output.
+    Raises AnimError.
     """
+    with atomic.name_errors(Path(job.output)):  # as while somebody exchanges a folder with a link
+        files = [job.folder / each for each in read]
+        return _write(job, product, files), _stamp_companions(job, product, files)
+
+
+def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
     check_output(job)
     path = job.folder / job.output
     try:
@@ -155,9 +162,8 @@ def write_output(job: Job, product: Bytes, read: Iterable[str | Path]) -> int:
         raise not_written(str(path.parent), error) from None
     folder = (job.folder / job.input).parent
     source = open_bytes(product, job.output)._replace(folder=folder)
-    spared = [job.folder / each for each in read]
     try:
-        size = write_file(source.document, str(path), source, unchanged=product, spared=spared)
+        size = write_file(source.document, str(path), source, unchanged=product, spared=spared, within=job.folder)
     except AnimError as error:
         error.problem = error.problem.replace(str(path), job.output)
         raise
@@ -167,10 +173,10 @@ def write_output(job: Job, product: Bytes, read: Iterable[str | Path]) -> int:
     return size
 
 
-def stamp_companions(job: Job, product: Bytes, read: Iterable[str | Path]) -> dict[str, Stamp | None]:
-    """Return the stamps of all files of a job besides input and output: those read, and buffers and images written.
+def _stamp_companions(job: Job, product: Bytes, read: Sequence[Path]) -> dict[str, Stamp | None]:
+    """Stamps of the files that the steps read, and of buffers and images of input and output.
 
-    product: GLB of the last step, whose images come from the input's folder. read: files that the steps read.
+    product: GLB of the last step, whose images come from the input's folder.
     """
     images = list(external_files(open_bytes(product, job.output)._replace(folder=(job.folder / job.input).parent)))
     written = external_files(open_file(str(job.folder / job.output))) if images or is_text(job.output) else ()

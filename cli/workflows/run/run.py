@@ -25,7 +25,6 @@ from cli.workflows.run.job import (
     input_size,
     is_text,
     run_job,
-    stamp_companions,
     write_output,
 )
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
@@ -145,8 +144,7 @@ class RecipeRun:
 
         def write() -> None:
             nonlocal size, files
-            size = write_output(job, product, record.files)
-            files = stamp_companions(job, product, record.files)
+            size, files = write_output(job, product, record.files)
 
         with use_streams(streams):
             code = run_guarded(write)
