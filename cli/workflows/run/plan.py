@@ -57,17 +57,17 @@ def explain_unused(
     book: RecipeBook, recipes: Sequence[Recipe], jobs: Sequence[Job], earlier: OutputRecord
 ) -> Iterator[str]:
     """Yield a line for each recipe that makes nothing since it matches only outputs of others, which are no inputs."""
+    outputs = dict.fromkeys(job.output for job in jobs)
     for recipe in recipes:
-        if any(job.steps is recipe.steps for job in jobs) or any(matches(job.input, recipe.match) for job in jobs):
+        if any(job.steps is recipe.steps for job in jobs):
             continue
-        others = [each for each in book.recipes if each is not recipe]
-        products = (name for name in earlier.outputs if earlier.is_product(name, others))
-        own = _fixed_folder(recipe.out, "{")
-        for name in chain((job.output for job in jobs), products):
-            if matches(name, recipe.match) and (not own or not PurePosixPath(name).is_relative_to(own)):
-                problem = f"recipe '{recipe.name}' makes nothing: it matches only outputs of others ('{name}')"
-                yield f"{problem}, which are no inputs: put all steps of a file into one recipe"
-                break
+        others, own = [each for each in book.recipes if each is not recipe], _fixed_folder(recipe.out, "{")
+        found = (name for name in {**outputs, **earlier.outputs} if matches(name, recipe.match))
+        outside = (name for name in found if not own or not PurePosixPath(name).is_relative_to(own))
+        name = next((each for each in outside if each in outputs or earlier.is_product(each, others)), "")
+        if name and not any(matches(job.input, recipe.match) for job in jobs):
+            problem = f"recipe '{recipe.name}' makes nothing: it matches only outputs of others ('{name}')"
+            yield f"{problem}, which are no inputs: put all steps of a file into one recipe"
 
 
 def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
