@@ -8,7 +8,9 @@ import numpy as np
 
 from anim.arrays import group_indices
 from anim.errors import NotFoundError
+from anim.maths import hierarchy
 from anim.model import Skeleton
+from anim.model.skeleton import node_mask
 from anim.operations.selection import match_names
 from anim.simulation.spring_bones.chains import SpringChain, SpringJoint, SpringParameters
 from anim.simulation.spring_bones.colliders import ORIGIN, Vector
@@ -34,12 +36,10 @@ def find_chains(
     """
     names = [name or f"#{i}" for i, name in enumerate(skeleton.names)]
     matched = match_names(globs, names, "node")
-    below = np.zeros(len(skeleton), np.bool_)
-    for node in matched:
-        below |= skeleton.descendants(node) & (np.arange(len(skeleton)) != node)
+    is_inside = np.append(hierarchy.with_descendants(skeleton.parents, node_mask(skeleton, matched)), False)
     children = group_indices(skeleton.parents.tolist())
     chains = []
-    for root in (node for node in matched if not below[node]):
+    for root in (node for node in matched if not is_inside[skeleton.parents[node]]):  # the last: above a root
         allowed = frozenset(skin_joints) if root in skin_joints else None
         joints = _joints(skeleton, root, children, parameters, allowed)
         if joints:

@@ -133,7 +133,8 @@ def uneven_joints(skeleton: Skeleton, bones: SpringBones) -> tuple[str, ...]:
     The scales of nodes above it do count.
     """
     notes = []
-    for joint in (joint for chain in bones.chains for joint in chain.joints):
+    can_turn = (np.ptp(skeleton.scale, axis=1) > 0) | (skeleton.scale < 0).any(axis=1)
+    for joint in (joint for chain in bones.chains for joint in chain.joints if can_turn[joint.node]):
         tail, scale = tail_at_rest(skeleton, joint), skeleton.scale[joint.node]
         drawn = scale * tail
         angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(tail, drawn)), tail @ drawn)))

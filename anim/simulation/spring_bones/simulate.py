@@ -97,7 +97,8 @@ def simulate_springs(
     rotations = _resample(motion.rotations, frames / steps.step_s)
     if looped is not None:
         rotations[-1] = np.where(quaternion.dot(rotations[-1], rotations[0])[:, None] < 0, -1.0, 1.0) * rotations[0]
-    replaced = [track.node for track in clip.tracks if track.path == "rotation" and track.node in bones.nodes]
+    nodes = frozenset(bones.nodes)
+    replaced = [track.node for track in clip.tracks if track.path == "rotation" and track.node in nodes]
     deflection = quaternion.angle_between(motion.rotations, skeleton.rotation[list(bones.nodes)])
     speeds = np.sqrt((np.diff(motion.tails, axis=0) ** 2).sum(axis=-1)) / steps.step_s
     return SpringResult(
