@@ -12,11 +12,20 @@ from contextlib import nullcontext
 from dataclasses import dataclass, fields, replace
 from typing import TypeAlias
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from anim.arguments import Length, check_choice, check_function, check_workers, glob_list, meters, num_bytes, radians
-from anim.arrays import Floats, as_floats
+from anim.arguments import (
+    Length,
+    check_choice,
+    check_flags,
+    check_function,
+    check_workers,
+    glob_list,
+    meters,
+    num_bytes,
+    radians,
+)
+from anim.arrays import Floats, as_times
 from anim.asset import Asset, AssetLike, PathName, as_asset, copy_asset
 from anim.baked_cache import BakedCache, BakeOrigin
 from anim.errors import AnimError, RangeError
@@ -113,6 +122,7 @@ def optimize(
     limit = None if max_bytes is None else num_bytes(max_bytes, "max_bytes")
     if progress is not None:
         check_function(progress, "progress", "a function of the fraction done")
+    check_flags(rebase_rest=rebase_rest)
     check_choice("effort", effort, tuple(EFFORTS))
     check_choice("drop", drop, tuple(Drop))
     check_choice("meshopt", meshopt or "ext", ("ext", "khr"))
@@ -168,6 +178,7 @@ def bake(
     bake("walk.glb", "walk", method="dqs", fps=24).save("walk.usdc")
     """
     asset = as_asset(asset)
+    check_flags(bulge_clamp=bulge_clamp, normals=normals, tangents=tangents, rigid=rigid)
     scene = (
         asset.scene
         if not (normals or tangents)
@@ -276,7 +287,7 @@ def _times(clip: Clip, fps: float | None, times: ArrayLike | None) -> Floats:
     if fps is not None and times is not None:
         raise RangeError("`fps` and `times` exclude each other")
     if times is not None:
-        return as_floats(np.atleast_1d(np.asarray(times)), "F", name="times")
+        return as_times(times)
     if fps is not None:
         return frame_times(clip.start, clip.end, fps=fps)
     return clip.key_times

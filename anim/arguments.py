@@ -1,15 +1,18 @@
-"""Checks of arguments for the functions of the facade."""
+"""Checks of arguments of public functions."""
 
 from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from numbers import Integral
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from anim import units
-from anim.errors import RangeError, ShapeError, check_number
+from anim.errors import RangeError, ShapeError, check_number, in_one_line
 
 Length: TypeAlias = str | float  # "0.5mm", "0.1%", or metres
 
@@ -83,21 +86,43 @@ def meters(value: str | float, name: str, scale: Callable[[], float], *, at_leas
             text = value.strip()
             raise RangeError(f"{name} is '{text}', without a unit (expected '{text}mm' or '{text}m', say)")
         return length
-    check_number(value, name)
-    if not math.isfinite(value) or (value < at_least if at_least is not None else value <= 0):
+    length = check_number(value, name)
+    if not math.isfinite(length) or (length < at_least if at_least is not None else length <= 0):
         least = "above 0" if at_least is None else f"from {at_least:g}"
         raise RangeError(f"{name} is {value} (expected metres {least}, or a length like '0.5mm' or '0.1%')")
-    return float(value)
+    return length
 
 
 def radians(value: str | float, name: str) -> float:
     """Return an angle above 0 in radians from a number, or from text with a unit."""
     if isinstance(value, str):
         return units.parse_angle(value, name)
-    check_number(value, name)
-    if not (math.isfinite(value) and value > 0):
+    angle = check_number(value, name)
+    if not (math.isfinite(angle) and angle > 0):
         raise RangeError(f"{name} is {value} (expected radians above 0, or an angle like '0.5deg')")
-    return float(value)
+    return angle
+
+
+def positive(value: object, name: str) -> float:
+    """Return a finite number above 0 as a float. Raises ShapeError or RangeError for others."""
+    number = check_number(value, name)
+    if not (math.isfinite(number) and number > 0):
+        raise RangeError(f"`{name}` is {number:g} (expected a number above 0)")
+    return number
+
+
+def index(value: object, name: str) -> int:
+    """Return a whole number as an int. Raises ShapeError for other types."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ShapeError(f"`{name}` is {in_one_line(value)} (expected an index)")
+    return int(value)
+
+
+def check_flags(**flags: object) -> None:
+    """Raise ShapeError unless all are True or False, of Python or numpy: "no" would count as true."""
+    for name, value in flags.items():
+        if not isinstance(value, bool | np.bool_):
+            raise ShapeError(f"`{name}` is {in_one_line(value)} (expected True or False)")
 
 
 def num_bytes(value: str | int, name: str) -> int:
@@ -108,7 +133,7 @@ def num_bytes(value: str | int, name: str) -> int:
         raise ShapeError(f"{name} is {kind(value)} (expected a number of bytes, or a size like '800kB')")
     if value < 1:
         raise RangeError(f"{name} is {value} (expected at least 1 byte, or a size like '800kB')")
-    return int(value)
+    return min(int(value), sys.maxsize)
 
 
 def check_workers(workers: object) -> None:

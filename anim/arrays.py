@@ -21,6 +21,9 @@ Number = TypeVar("Number", np.float64, np.int64)
 Key = TypeVar("Key", bound=Hashable)
 
 MAX_SINGLE_M = 1e15  # of coordinates in float32: their squares, and sums of these, are finite
+MIN_SUMMED = 1 << 13  # numbers; the sum of fewer squares is no faster than a look at each
+_FLOAT64 = np.dtype(np.float64)
+_NO_NUMBERS = {"U": "text", "S": "bytes", "M": "dates", "m": "differences of dates", "V": "records"}  # kinds of arrays
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
 
 
@@ -32,12 +35,7 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
     Raises ShapeError for a wrong shape or type, DataRangeError for NaN or infinity.
     as_floats([[0, 1, 2]], "K 3") → array of shape (1, 3)
     """
-    if isinstance(values, np.ndarray) and values.dtype.kind == "c":
-        raise ShapeError(f"{name} has complex numbers (expected real ones)")
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{name} holds something that is no number ({error})") from None
+    array = _as_float64(values, name)
     check_shape(array, shape, name=name)
     if not is_finite(array):
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -46,6 +44,11 @@ def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:
         return array
     fresh = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.dtype != array.dtype)
     return freeze(array) if fresh else own(array)
+
+
+def as_times(values: ArrayLike, *, name: str = "times") -> Floats:
+    """Return any times (F,) in seconds as a read-only float64 array, finite; a single number is one time."""
+    return as_floats(np.atleast_1d(_as_float64(values, name)), "F", name=name)
 
 
 def as_key_times(values: ArrayLike, *, name: str = "times") -> Floats:
@@ -94,9 +97,32 @@ def group_indices(keys: Iterable[Key]) -> dict[Key, list[int]]:
 
 
 def is_finite(array: AnyArray) -> bool:
-    """Return whether every number is finite; a finite sum of squares is a fast proof."""
+    """Return whether every number is finite; of long arrays a finite sum of squares is a fast proof."""
     flat = array.reshape(-1)
-    return math.isfinite(flat.dot(flat)) or bool(np.isfinite(array).all())
+    if len(flat) >= MIN_SUMMED:
+        with np.errstate(over="ignore"):  # takes as long as looking at thousands
+            if math.isfinite(flat.dot(flat)):
+                return True
+    return bool(np.count_nonzero(np.isfinite(flat)) == len(flat))
+
+
+def _as_float64(values: ArrayLike, name: str) -> Floats:
+    """Values as float64, those of a float64 array without a copy."""
+    if type(values) is np.ndarray and values.dtype is _FLOAT64:
+        return values
+    if isinstance(values, np.ndarray) and type(values) is not np.ndarray and np.ma.is_masked(values):
+        raise ShapeError(f"{name} has masked values (expected numbers)", help="choose with .compressed() or .filled()")
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "c":
+            raise ShapeError(f"{name} has complex numbers (expected real ones)")
+        if array.dtype.kind in _NO_NUMBERS:
+            raise ShapeError(f"{name} holds something that is no number ({_NO_NUMBERS[array.dtype.kind]})")
+        return np.asarray(array, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} holds something that is no number ({error})") from None
+    except OverflowError:
+        raise DataRangeError(f"{name} holds a number beyond all floats (expected finite numbers)") from None
 
 
 def own(array: NDArray[Any]) -> NDArray[Any]:

@@ -19,7 +19,7 @@ from anim.errors import AnimError, FormatError, RangeError, ShapeError, check_ty
 from anim.files import resolver
 from anim.files.resolver import refuse_without_folder
 from anim.files.stream import write_stream
-from anim.gltf.document import Document, copy_json, json_array
+from anim.gltf.document import Document, copy_json, count_objects, json_array
 from anim.gltf.io import container, json_text
 from anim.gltf.io.source import Source, glb_chunks, open_bytes, open_file, write_file
 from anim.gltf.reading import reader
@@ -136,9 +136,7 @@ class Asset:
         return notebook.frame(lambda: page(notebook.document_file(self._checked(), self.source)), repr(self))
 
     def __repr__(self) -> str:
-        counts = ", ".join(
-            f"{key}={len(json_array(self.document.json, key))}" for key in ("animations", "nodes", "meshes")
-        )
+        counts = count_objects(self.document.json, ("animations", "nodes", "meshes"))
         is_changed = self.source is not None and self.document is not self.source.document
         return f"Asset({self.name!r}, {counts}{', changed' if is_changed else ''})"
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TypeAlias
 
 from anim.asset import Asset, PathName, as_asset
-from anim.errors import AnimError, RangeError, check_type
+from anim.errors import AnimError, RangeError, check_number, check_type
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.error.metric import ErrorMetric
@@ -62,8 +62,10 @@ def _view(
     file: PageFile, clip: str | int | None, node: str | None, time: float | None, show: Sequence[str]
 ) -> PageView:
     """State of the page when it opens. Raises NotFoundError and RangeError."""
+    check_type(show, Collection, "show")
     if unknown := [name for name in show if name not in SHOWS]:
         raise RangeError(f"`show` has {unknown[0]!r} (expected {', '.join(SHOWS)})")
+    time = None if time is None else check_number(time, "time")
     if time is not None and not (math.isfinite(time) and time >= 0):
         raise RangeError(f"`time` is {time} (expected seconds, 0 or more)")
     asset = Asset(file.document)

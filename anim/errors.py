@@ -16,6 +16,7 @@ from __future__ import annotations
 import errno
 from typing import Any, Self
 
+MAX_SHOWN = 80  # characters of a value in a message
 _NO_MEMORY = (
     "cannot allocate memory",
     "failed to map segment",  # of the system's loader
@@ -114,12 +115,25 @@ def check_type(value: object, expected: type, name: str, *, help: str = "") -> N
         raise ShapeError(f"{name} is {got} (expected {expected.__name__})", help=help)
 
 
-def check_number(value: object, name: str) -> None:
-    """Raise ShapeError unless `value`, named `name`, is a real number; True and False are none."""
+def check_number(value: object, name: str) -> float:
+    """Return `value`, named `name`, as a float: numpy's scalars would compute, and overflow, in their own precision.
+
+    Raises ShapeError unless it is a real number, as True and False are not, RangeError for one beyond all floats.
+    """
     import numbers
 
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ShapeError(f"`{name}` is {value!r} (expected a number)")
+        raise ShapeError(f"`{name}` is {in_one_line(value)} (expected a number)")
+    try:
+        return float(value)
+    except OverflowError:
+        raise RangeError(f"`{name}` is beyond all floats (expected at most 1.8e308 in magnitude)") from None
+
+
+def in_one_line(value: object) -> str:
+    """Return the representation of a value for messages, or its type if that is long, as of arrays."""
+    text = repr(value)
+    return text if len(text) <= MAX_SHOWN and "\n" not in text else type(value).__name__
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, TypeAlias
@@ -95,9 +95,7 @@ class Document:
     expanded: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
-        counts = ", ".join(
-            f"{key}={len(json_array(self.json, key))}" for key in ("animations", "nodes", "meshes", "skins")
-        )
+        counts = count_objects(self.json, ("animations", "nodes", "meshes", "skins"))
         return f"Document({counts}, buffer_bytes={sum(each.byte_length for each in self.buffers)})"
 
 
@@ -111,6 +109,12 @@ def json_array(json: Json, key: str) -> list[Json]:
     """Return the objects of a top-level array, empty if the file has none."""
     found: list[Json] = json.get(key, [])
     return found
+
+
+def count_objects(json: Json, keys: Sequence[str]) -> str:
+    """Return the lengths of top-level arrays, "nodes=3, meshes=1"; of edited JSON one may be no array: "nodes=?"."""
+    found = [(key, json.get(key, [])) for key in keys]
+    return ", ".join(f"{key}={len(each) if isinstance(each, list) else '?'}" for key, each in found)
 
 
 def copy_json(json: Json) -> Json:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from anim.arguments import positive
 from anim.arrays import Bools, Floats
 from anim.curves.easing import table
 from anim.curves.easing.function import Easing
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_linear, fit_segments
-from anim.errors import DataRangeError, RangeError, check_type
+from anim.errors import DataRangeError, RangeError, check_number, check_type
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.cubic_segments import to_cubicspline, to_step, with_distinct_keys
 from anim.operations.ease_track import EasedTrack, ease_segments, ease_steps
@@ -33,6 +34,10 @@ class Tolerances:
 
     fraction: float = TOLERANCE
     angle: float = ANGLE_TOLERANCE_RAD
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fraction", positive(self.fraction, "tolerance"))
+        object.__setattr__(self, "angle", positive(self.angle, "angle_tolerance"))
 
 
 def ease(
@@ -55,14 +60,17 @@ def ease(
     start, end: seconds; only segments between are eased.
     interpolation: "cubicspline", exact for cubic easings, or "linear". Steps become STEP, or jumps within one float32
     interval if only a part is eased.
-    tracks: indices of the tracks to ease, None for all. Raises RangeError for another interpolation.
+    tracks: indices of the tracks to ease, None for all. Raises RangeError for another interpolation, or an empty range.
     (keys 0, 1 s: 0, 1; quad-in) → keys 0, 1 s with in tangent 2 at 1 s
     """
     chosen = track_indices(clip, tracks)
-    if interpolation not in OUTPUTS:
-        raise RangeError(f"`interpolation` is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
+    check_output(interpolation)
     easing = table.parse(easing) if isinstance(easing, str) else easing
     check_type(easing, Easing, "easing", help="anim.EASINGS has their names")
+    check_type(tolerances, Tolerances, "tolerances")
+    start, end = check_number(start, "start"), check_number(end, "end")
+    if not end > start:
+        raise RangeError(f"the range from {start:g} s to {end:g} s is empty")
     job = _Job(easing, start, end, tolerances, interpolation)
     made: dict[object, tuple[Track, Track]] = {}  # many tracks are equal but for their node, as constant scales
     new = list(clip.tracks)
@@ -73,6 +81,12 @@ def ease(
             made[keys] = track, job.eased(track)
         new[i] = _repeat(track, *made[keys])
     return Clip(clip.name, tuple(new))
+
+
+def check_output(interpolation: str) -> None:
+    """Raise RangeError unless eased keys can have this interpolation."""
+    if interpolation not in OUTPUTS:
+        raise RangeError(f"`interpolation` is '{interpolation}' (expected one of {', '.join(OUTPUTS)})")
 
 
 def _compared(track: Track) -> tuple[object, ...]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from anim.arguments import index
 from anim.arrays import Bools, Floats
 from anim.errors import RangeError, check_number
 from anim.maths import hermite, quaternion
@@ -32,7 +33,7 @@ def append_first_frame(clip: Clip, *, fps: float, tracks: frozenset[int] | None 
     (x = 0, 1, 2 at 0, 1, 2 s; fps 1) → 0, 1, 2, 0; of the root 0, 1, 2, 3
     """
     chosen = track_indices(clip, tracks)
-    check_fps(fps)
+    fps, root = check_fps(fps), index(root, "root")
     end = clip.end + 1 / fps
     return Clip(
         clip.name,
@@ -68,13 +69,13 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, fram
     Raises RangeError unless 0 < blend ≤ the clip's duration, which is that of float32 keys: 1.3 s is 1.29999995 s.
     """
     chosen = track_indices(clip, tracks)
-    check_number(blend, "blend")
+    blend = check_number(blend, "blend")
     duration = clip.end - clip.start
     if not 0 < blend <= duration + DURATION_TOLERANCE_FRACTION * clip.end:
         raise RangeError(f"`blend` is {blend:g} s (expected more than 0, at most the clip's {duration:g} s)")
     blend = min(blend, duration)
     if frame_rate is not None:
-        check_fps(frame_rate)
+        frame_rate = check_fps(frame_rate)
     at_end = _Blend(clip.start, clip.end - blend, clip.end, blend, frame_rate)
     return change_tracks(clip, chosen, lambda tracks: _close(tracks, at_end))
 

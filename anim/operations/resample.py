@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from anim.arguments import check_flags
 from anim.arrays import Floats
 from anim.errors import RangeError
 from anim.maths import quaternion
@@ -41,6 +42,7 @@ def resample(
     (keys 0, 1 s; fps 4) → keys 0, 0.25, 0.5, 0.75, 1 s
     """
     chosen = track_indices(clip, tracks)
+    check_flags(snap=snap)
     if interpolation not in INTERPOLATIONS:
         raise RangeError(f"`interpolation` is '{interpolation}' (expected one of {', '.join(INTERPOLATIONS)})")
     axis = TimeAxis(key_times(frame_times(clip.start, clip.end, fps=fps)))

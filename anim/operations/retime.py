@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from anim.arguments import check_flags
 from anim.arrays import Floats
 from anim.errors import RangeError, UnsupportedError, check_number
 from anim.model import Clip, Interpolation, TimeAxis, Track
@@ -42,11 +43,12 @@ def retime(
     (keys 0, 1 s; speed 0.25) → keys 0, 4 s
     """
     chosen = track_indices(clip, tracks)
+    check_flags(reverse=reverse, ping_pong=ping_pong)
     if speed is not None and duration is not None:
         raise RangeError("`speed` and `duration` exclude each other")
     factor = _factor(clip, speed, duration)
     start, end = clip.start, clip.start + (clip.end - clip.start) * factor
-    offset = _resolve_offset(offset, start)
+    offset = _resolve_offset(check_number(offset, "offset"), start)
     _check_end(clip, end + offset + (end - start if ping_pong else 0.0))
     steps: list[Callable[[Track], Track]] = []
     if factor != 1:
@@ -143,7 +145,7 @@ def _check_end(clip: Clip, end: float) -> None:
 
 def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
     if speed is not None:
-        check_number(speed, "speed")
+        speed = check_number(speed, "speed")
         if not 0 < speed <= MAX_SPEED:
             raise RangeError(
                 f"`speed` is {speed:g} (expected above 0, at most {MAX_SPEED:g})",
@@ -152,7 +154,7 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
         return 1 / speed
     if duration is None:
         return 1.0
-    check_number(duration, "duration")
+    duration = check_number(duration, "duration")
     if not (math.isfinite(duration) and duration >= MIN_DURATION_S):
         raise RangeError(f"`duration` is {duration:g} s (expected {MIN_DURATION_S:g} or more)")
     own = clip.end - clip.start

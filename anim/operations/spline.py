@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from anim.arguments import check_flags, check_function, index
 from anim.curves.tangents.rule import TangentRule
 from anim.curves.tangents.table import (
     DEFAULT_RULE,
@@ -17,7 +18,7 @@ from anim.curves.tangents.table import (
     check_closed,
     parse,
 )
-from anim.errors import AnimError, RangeError
+from anim.errors import AnimError, RangeError, check_type
 from anim.maths import quaternion
 from anim.model import Clip, Interpolation, Track, ValueKind
 from anim.operations.selection import track_indices
@@ -51,6 +52,10 @@ def spline(
     """
     chosen = track_indices(clip, tracks)
     rule = parse(tangents) if isinstance(tangents, str) else tangents
+    check_type(rule, TangentRule, "tangents", help="anim.TANGENTS has their names")
+    check_flags(cyclic=cyclic)
+    check_function(label, "label", "a function from a node's index to its name")
+    root = index(root, "root")
     is_loop = cyclic or rule.loop
 
     def apply(tracks: StackedTracks) -> Sequence[Track]:

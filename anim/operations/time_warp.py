@@ -9,14 +9,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from anim.arguments import positive
 from anim.arrays import Floats, unique_sorted
 from anim.curves.easing import table
 from anim.curves.easing.function import CubicSegment, Easing, evaluate
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
 from anim.curves.fitting.easing_fit import fit_segments
-from anim.errors import DataRangeError, RangeError, check_type
+from anim.errors import DataRangeError, RangeError, check_number, check_type
 from anim.model import Clip, Interpolation, TimeAxis, Track, ValueKind
 from anim.operations.cubic_segments import with_distinct_keys
+from anim.operations.ease import check_output
 from anim.operations.ease_track import slope
 from anim.operations.selection import track_indices
 from anim.sampling import segment
@@ -26,6 +28,7 @@ from anim.sampling.track import sample
 
 TOLERANCE = 1e-3  # of a track's range, if no cubic is exact
 ANGLE_TOLERANCE_RAD = math.radians(0.05)
+MAX_RANGE_S = 1e15  # beyond, float64 resolves no time of a clip
 MAX_HALVINGS = 60  # of the search for the time at which the map reaches a key
 SNAP_TOLERANCE_S = 1e-10  # s; error of the search for a key's time
 MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
@@ -50,17 +53,21 @@ def warp(
     STEP keys move exactly to the times at which the map reaches them. Others become CUBICSPLINE: exact for LINEAR
     vectors under a cubic easing, otherwise within `tolerance` (fraction of a track's range) or `angle_tolerance` (rad);
     with interpolation "linear" LINEAR, within the same.
-    Raises RangeError for an empty range, or an easing that jumps.
+    Raises RangeError for an empty or endless range, or an easing that jumps.
     """
     chosen = track_indices(clip, tracks)
     easing = table.parse(easing) if isinstance(easing, str) else easing
     check_type(easing, Easing, "easing", help="anim.EASINGS has their names")
-    first = clip.start if start is None else start
-    last = clip.end if end is None else end
+    check_output(interpolation)
+    tolerance, angle_tolerance = positive(tolerance, "tolerance"), positive(angle_tolerance, "angle_tolerance")
+    first = clip.start if start is None else check_number(start, "start")
+    last = clip.end if end is None else check_number(end, "end")
     if easing.stepped:
         raise RangeError(f"'{easing.name}' jumps, and time can't")
     if not last > first:
         raise RangeError(f"the range from {first:g} s to {last:g} s is empty")
+    if last - first > MAX_RANGE_S:
+        raise RangeError(f"the range from {first:g} s to {last:g} s is too long (limit {MAX_RANGE_S:g} s)")
     new = []
     corners: dict[tuple[TimeAxis, tuple[CubicSegment, ...]], Floats] = {}  # equal for equal axes and maps
     for i, track in enumerate(clip.tracks):

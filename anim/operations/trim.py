@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from anim.arguments import check_flags
 from anim.arrays import Bools, Floats
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys
 from anim.errors import RangeError, check_number
@@ -42,9 +43,9 @@ def trim(
     (keys 0, 1 s: 0, 10; start 0.25) → keys 0.25, 1 s: 2.5, 10
     """
     chosen = track_indices(clip, tracks)
-    for name, time in (("start", start), ("end", end)):
-        if time is not None:
-            check_number(time, name)
+    check_flags(rebase=rebase)
+    start = None if start is None else check_number(start, "start")
+    end = None if end is None else check_number(end, "end")
     if (start is not None or end is not None) and clip.end > clip.start:
         clip = _trim_clip(clip, start, end, chosen)
     first = min((float(clip.tracks[i].times[0]) for i in chosen), default=0.0)
@@ -54,8 +55,8 @@ def trim(
 
 
 def _trim_clip(clip: Clip, start: float | None, end: float | None, chosen: frozenset[int]) -> Clip:
-    first = clip.start if start is None else max(float(np.float32(start)), clip.start)
-    last = clip.end if end is None else min(float(np.float32(end)), clip.end)
+    first = clip.start if start is None or start <= clip.start else max(float(np.float32(start)), clip.start)
+    last = clip.end if end is None or end >= clip.end else min(float(np.float32(end)), clip.end)
     if not last > first:
         raise RangeError(_nothing_left(clip, start, end))
     new = list(change_tracks(clip, chosen, lambda tracks: _trim_tracks(tracks, first, last)).tracks)

@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from anim import arrays
+from anim.arguments import positive
 from anim.arrays import Floats, Ints
-from anim.errors import RangeError, UnsupportedError, check_number
+from anim.errors import UnsupportedError, check_number
 
 MIN_INTERVAL_FRAMES = (
     1e-3  # frames; a last interval shorter than this, or than float32 resolves at the end, is rounding
@@ -28,11 +29,9 @@ MIN_JUMP_S = 1e-6  # s; shortest time between two keys that represent a jump, to
 MAX_JUMP_S = 1.5e-6  # s; with two float32 steps, the longest time between two keys that represent a jump
 
 
-def check_fps(fps: float) -> None:
-    """Raise ShapeError or RangeError unless `fps` is a number above 0."""
-    check_number(fps, "fps")
-    if not (math.isfinite(fps) and fps > 0):
-        raise RangeError(f"`fps` is {fps:g} (expected a number above 0)")
+def check_fps(fps: float) -> float:
+    """Return frames per second as a float. Raises ShapeError or RangeError unless it is a number above 0."""
+    return positive(fps, "fps")
 
 
 def check_duration(start: float, end: float, *, fps: float, help: str = FEWER_FRAMES) -> float:
@@ -40,7 +39,7 @@ def check_duration(start: float, end: float, *, fps: float, help: str = FEWER_FR
 
     help: the way out, for the message.
     """
-    frames = (end - start) * fps
+    frames = (end - start) * float(fps)
     if frames > MAX_FRAMES:
         raise too_many_frames(frames, fps, help=help)
     return frames
@@ -62,9 +61,7 @@ def frame_times(start: float, end: float, *, fps: float, help: str = FEWER_FRAME
     frame_times(0, 1, fps=4) → 0, 0.25, 0.5, 0.75, 1
     frame_times(0, 0.6, fps=4) → 0, 0.25, 0.5, 0.6
     """
-    check_number(start, "start")
-    check_number(end, "end")
-    check_fps(fps)
+    start, end, fps = check_number(start, "start"), check_number(end, "end"), check_fps(fps)
     frames = check_duration(start, end, fps=fps, help=help)
     sliver = max(MIN_INTERVAL_FRAMES, 2 * float(np.spacing(np.float32(end))) * fps)
     whole = max(math.ceil(frames - sliver), 1 if end > start else 0)

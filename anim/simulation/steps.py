@@ -37,7 +37,7 @@ class Steps:
 
     def __post_init__(self) -> None:
         for name, value in (("step", self.step_s), ("duration", self.duration_s), ("warm_up", self.warm_up_s)):
-            check_number(value, name)
+            value = check_number(value, name)
             if not math.isfinite(value) or value < 0:
                 raise RangeError(f"`{name}` is {value:g} s (expected {'above 0' if name == 'step' else 'at least 0'})")
         check_range("step", self.step_s, 0.0, MAX_STEP_S, "s", is_above=True)
@@ -79,7 +79,7 @@ def count_substeps(fps: float, step: float) -> int:
     Raises RangeError unless both are above 0, UnsupportedError for over ten million.
     count_substeps(60, 1 / 240) → 4
     """
-    check_fps(fps)
+    fps = check_fps(fps)
     check_range("step", step, 0.0, math.inf, "s", is_above=True)
     if not fps * step * MAX_STEPS >= 1:
         raise UnsupportedError(f"more than {MAX_STEPS} steps of {step:g} s in a frame", help="choose a longer `step`")

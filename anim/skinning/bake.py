@@ -91,7 +91,7 @@ def prepare_bake(
     """
     check_type(scene, Scene, "scene", help="anim.bake takes an asset")
     _check_indices(nodes, threads)
-    _check(method, blend, space, bulge_clamp=bulge_clamp)
+    blend = _check(method, blend, space, bulge_clamp=bulge_clamp)
     chosen = bakeable_instances(scene, rigid=rigid, nodes=nodes)
     if not chosen:
         raise NotFoundError("there is no mesh with a skin or morph targets to bake", help=_hint(scene, rigid=rigid))
@@ -215,11 +215,12 @@ def _maker(method: str, blend: float | None, *, bulge_clamp: bool) -> Make:
     return make
 
 
-def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -> None:
+def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -> float | None:
+    """Return `blend` as a float. Raises RangeError for what is not one of the known, ShapeError for another type."""
     if method not in SKINNING_METHODS:
         raise RangeError(f"`method` is '{method}' (expected one of {', '.join(SKINNING_METHODS)})")
     if blend is not None:
-        check_number(blend, "blend")
+        blend = check_number(blend, "blend")
     if blend is not None and not 0 <= blend <= 1:
         raise RangeError(f"`blend` is {blend:g} (expected 0 … 1)")
     if method == "lbs" and (blend is not None or bulge_clamp):
@@ -227,6 +228,7 @@ def _check(method: str, blend: float | None, space: str, *, bulge_clamp: bool) -
         raise RangeError(f"`{what}` requires a method other than lbs (expected dqs or cor)")
     if space not in SPACES:
         raise RangeError(f"`space` is '{space}' (expected one of {', '.join(SPACES)})")
+    return blend
 
 
 def _check_indices(nodes: Sequence[int] | None, threads: int | None) -> None:

@@ -37,7 +37,7 @@ def test_shapes(shape: str, good: list[tuple[int, ...]], bad: list[tuple[int, ..
             arrays.check_shape(np.zeros(each), shape, name="values")
 
 
-@pytest.mark.parametrize("values", [["a"], [None, "b"], [[1], [1, 2]], [1j], np.array([1j]), {"a": 1}])
+@pytest.mark.parametrize("values", [["a"], [None, "b"], [[1], [1, 2]], [1j], np.array([1j]), {"a": 1}, ["1"], [b"1"]])
 def test_what_is_no_number_is_refused(values: Any) -> None:
     with pytest.raises(ShapeError):
         arrays.as_floats(values, "K")
@@ -50,7 +50,7 @@ def test_the_first_number_that_is_not_finite_is_named(bad: float) -> None:
         arrays.as_floats(values, "K 2", name="values")
 
 
-@pytest.mark.parametrize("values", [[3.4e38, 3.4e38], [1e150, -1e150], [5e-324]])
+@pytest.mark.parametrize("values", [[3.4e38, 3.4e38], [1e150, -1e150], [5e-324], [1e308] * 3, [1e200] * 10_000])
 def test_large_and_small_numbers_are_finite(values: list[float]) -> None:
     assert arrays.as_floats(values, "K").tolist() == values
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+import anim
 import fixtures
 from anim.gltf.io import container
 from anim.gltf.reading import reader
@@ -12,6 +13,14 @@ from anim.sampling.sample import sample
 from anim.skinning.bake import bake
 
 MAX_WIDTH = 120
+
+
+def test_of_edited_json_what_is_no_array_has_no_length() -> None:
+    asset = anim.load(fixtures.build("biped"))
+    asset.document.json["nodes"] = None
+    assert repr(asset) == "Asset('bytes', animations=3, nodes=?, meshes=1)"
+    assert "nodes=?" in repr(asset.document)
+    assert "nodes: is null" in asset._repr_html_()
 
 
 def test_each_value_is_one_short_line() -> None:

@@ -156,7 +156,7 @@ def _frames(clip: Clip, fps: float | None) -> tuple[Floats, Floats]:
     start, end = clip.start, clip.end
     keys = clip.key_times
     if fps is not None:
-        check_fps(fps)
+        fps = check_fps(fps)
         frames = check_duration(start, end, fps=fps)
         check_curve_memory(clip, math.ceil(frames))
         shown = np.arange(int(np.ceil(frames - GRID_TOLERANCE_FRAMES)) + 1) / fps

@@ -53,7 +53,7 @@ def write(
     """
     package()
     if fps is not None:
-        check_fps(fps)
+        fps = check_fps(fps)
     if not any(len(each.mesh.faces) for each in scene.instances):
         raise NotFoundError("there is no mesh with faces to write", help="USD has no use for a file without meshes")
     own_rate = frame_rate(clip) if fps is None else fps

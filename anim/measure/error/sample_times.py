@@ -30,7 +30,7 @@ def dense_times(*clips: Clip, fps: float = FPS) -> Floats:
     In seconds, increasing. The grid includes 0 s, and starts with the last frame before the first key, which is equal
     to all earlier ones. Frames that differ from a key by rounding are that key.
     """
-    check_fps(fps)
+    fps = check_fps(fps)
     keys = key_and_mid_times(*clips)
     frames = grid_times(*clips, fps=fps, start=max(math.ceil((keys[0] - SAME_MOMENT) * fps) - 1, 0) / fps)
     after = np.minimum(np.searchsorted(keys, frames), len(keys) - 1)
