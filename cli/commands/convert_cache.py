@@ -23,6 +23,7 @@ from cli.io import cache_files, documents
 from cli.io.cache_folders import StagedFolder
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
+from cli.reports import image_notes
 from cli.workflows.bake_clip import Output, choose_clip, onto_source
 from cli.workflows.cache_page import check_cache_page, commit_cache_page_after
 
@@ -148,6 +149,8 @@ def command(
     for words in loaded.notes:
         reporter.warn(words)
     saved.report(reporter)
+    if onto is not None and ending == ".gltf" and not dry_run:
+        image_notes.report(source.document, source, output, reporter)
     name = loaded.name if output == documents.PIPE else output
     parts = [
         f"{name}  {text.format_change(size, saved.size)}",

@@ -107,7 +107,7 @@ def write_file(
     from anim.files import atomic
     from anim.gltf.io import gltf_files, images
 
-    copies: dict[Path, Bytes] = {}
+    copies: dict[Path, Path] = {}
     if source is not None and source.folder is not None and not source.is_in_folder(path):
         document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
