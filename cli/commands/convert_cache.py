@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -133,14 +132,9 @@ def command(
                 return cache_files.commit_alone(staged)
             return commit_cache_page_after(html, (input, output), staged, (), reporter, dry_run=dry_run)
 
-        def inputs() -> list[list[Path]]:
-            return [loaded.files, documents.input_files(source) if onto is not None else []]
-
         counted = _counted(cache, progress)
         try:
-            saved = cache_files.save(
-                counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with, inputs=inputs
-            )
+            saved = cache_files.save(counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with)
         finally:
             progress.close()
         size = loaded.size

@@ -194,7 +194,7 @@ def command(
 
     def edit(input: str, output: str) -> None:
         began = time.perf_counter()
-        outputs.check_paths(input, output)
+        outputs.check_paths(output)
         with documents.source(input, reporter) as source:
             optimizer = optimize_job.make_optimizer(
                 source,

@@ -103,7 +103,8 @@ def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> Non
 
 
 @pytest.mark.parametrize(
-    ("name", "problem"), [("crowd/../noop.glb", "would replace a checked file"), ("none/a.json", "there is no folder")]
+    ("name", "problem"),
+    [("crowd/../noop.glb", "--write-baseline would replace an input"), ("none/a.json", "there is no folder")],
 )
 def test_a_baseline_replaces_no_checked_file(name: str, problem: str, folder: Path, call: Call) -> None:
     before = (folder / "noop.glb").read_bytes()

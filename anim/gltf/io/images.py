@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from anim.errors import FormatError, OutputError
-from anim.files import atomic, before_commit, resolver
+from anim.files import atomic, guard, resolver
 from anim.files.special_files import open_regular
 from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
@@ -57,7 +57,8 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
 def write_copies(copies: Mapping[Path, Path]) -> None:
     """Copy images to free names; an existing file there has the same bytes. Raises OutputError."""
     if copies:
-        before_commit.run_job()
+        guard.plan_new(copies)
+        guard.begin()
     for path, file in copies.items():
         with atomic.name_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)

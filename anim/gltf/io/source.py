@@ -104,7 +104,7 @@ def write_file(
     ones where possible.
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
-    from anim.files import atomic
+    from anim.files import atomic, guard
     from anim.gltf.io import gltf_files, images
 
     copies: dict[Path, Path] = {}
@@ -115,8 +115,10 @@ def write_file(
         images.write_copies(copies)
     if not path.lower().endswith(".gltf"):
         content = glb_chunks(document, unchanged)
-        if not dry_run:
-            atomic.write_file(Path(path), content)
+        if dry_run:
+            guard.plan(Path(path), in_place=True)
+        else:
+            atomic.write_file(Path(path), content, in_place=True)
         return sum(len(piece) for piece in content)
     same_folder = source is not None and source.is_in_folder(path)
     spared = [] if source is None or source.is_at(path) else list(external_files(source))

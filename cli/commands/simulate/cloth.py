@@ -197,12 +197,7 @@ def command(
         )
     with commit_report_after(run.report, report, dry_run=dry_run):
         saved = cache_files.save(
-            cache,
-            output,
-            caches.write_options(ending, given | {"max_error": meters}),
-            ending=ending,
-            dry_run=dry_run,
-            inputs=lambda: [documents.input_files(source)],
+            cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
         )
     saved.report(reporter)
     if ending == ".gltf" and not dry_run:
