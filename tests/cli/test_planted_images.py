@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.running import built, shell
+from tests.cli.running import built
 from tests.fixtures.reading import split
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(20)
@@ -48,19 +48,6 @@ def test_only_images_are_embedded(call: Call, tmp_path: Path) -> None:
     images = split(run.product())[0]["images"]
     assert [each["uri"][:9] for each in images] == [*(name[:9] for name in PLANTED), "data:imag"]
     assert "note: 8 images are left out" in run.err
-
-
-def test_a_long_image_is_copied_piece_by_piece(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    text = json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "skin.png"}]})
-    (tmp_path / "in" / "scene.gltf").write_text(text)
-    (tmp_path / "in" / "skin.png").write_bytes(PNG)
-    with (tmp_path / "in" / "skin.png").open("r+b") as file:
-        file.truncate(400_000_000)
-    (tmp_path / "out").mkdir()
-    line = "ulimit -v 1500000; gltf-anim convert in/scene.gltf out/scene.glb"
-    shell(line, tmp_path).product()
-    assert (tmp_path / "out" / "skin.png").stat().st_size == 400_000_000
 
 
 def planted(folder: Path, call: Call) -> Path:

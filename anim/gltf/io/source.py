@@ -60,11 +60,11 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     for _ in range(MAX_OPEN_ATTEMPTS):
         before = _stamp(real)
         data, buffers = resolver.read_file(real, read=resolver.read_gltf), resolver.CompanionFiles(real.parent)
-        document = opener(data, buffers.open)
-        outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
-        for address in outside:
-            with suppress(FormatError):  # raised again when the bytes are read
-                buffers.open(uri.relative_path(address))
+        document = opener(data, buffers)
+        outside = [each for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
+        for buffer in outside:
+            with suppress(FormatError):  # raised again when the bytes are used
+                _ = buffer.data
         if not outside or _stamp(real) == before:
             break
     return Source(document, path, len(data) + external_size(document), real.parent, data)
