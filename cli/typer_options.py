@@ -22,6 +22,8 @@ from anim.errors import AnimError, RangeError, not_written
 from anim.files.special_files import descriptor_of
 
 OUTPUTS = ("output", "files")  # parameters whose value, or last value, is OUT
+OTHER_OUTPUTS = ("report", "html", "plot", "curve_file", "write_known")  # parameters with the names of other outputs
+OUT = "OUT"  # in messages
 STDOUT = 1  # its descriptor
 DEPFILE = "gltf_anim.depfile"  # key of the context
 MEMORY_LIMIT = "gltf_anim.memory_limit"  # key of the context
@@ -84,23 +86,47 @@ class Command(Parsing, TyperCommand):
         try:
             # Results that are not finite are errors where they are written.
             with np.errstate(all="ignore"), memory_limit(ctx.meta.get(MEMORY_LIMIT)):
-                path = ctx.meta.get(DEPFILE)
-                return super().invoke(ctx) if path is None else self._invoke_with_depfile(ctx, path)
+                return self._invoke_guarded(ctx)
         except AnimError as error:
             options = {str(each.name): each.opts[0] for each in self.params if each.param_type_name == "option"}
             options.setdefault("fps", options.get("samples_per_second", "fps"))  # the rate of what is measured
             name_options(error, options)
             raise
 
-    def _invoke_with_depfile(self, ctx: Any, path: str) -> Any:
-        """Run the command, and write a dependency file with its output."""
-        from cli.io import depfile_output
-
-        values = [ctx.params[name] for name in OUTPUTS if ctx.params.get(name)]
-        output = "" if not values else values[0] if isinstance(values[0], str) else values[0][-1]
-        depfile_output.check(path, output, ctx.params.values())
+    def _invoke_guarded(self, ctx: Any) -> Any:
+        """Run a command so that none of its outputs replaces another file of it; write a dependency file with OUT."""
+        outputs, others = self._output_names(ctx)
         run = super().invoke
-        return depfile_output.invoke(lambda: run(ctx), path, output, dry_run=bool(ctx.params.get("dry_run")))
+        if not outputs:  # `run` has its own check of many commands' outputs
+            return run(ctx)
+        from anim.files import guard
+        from cli.io import command_files
+
+        command_files.check_names(outputs, others)
+        path = ctx.meta.get(DEPFILE)
+        with guard.use(files := command_files.CommandFiles()):
+            if path is None:
+                return run(ctx)
+            from cli.io import depfile_output
+
+            output, dry_run = outputs.get(OUT, ""), bool(ctx.params.get("dry_run"))
+            depfile_output.check(path, output)
+            return depfile_output.invoke(lambda: run(ctx), path, output, files, dry_run=dry_run)
+
+    def _output_names(self, ctx: Any) -> tuple[dict[str, str], list[Any]]:
+        """Return the names of outputs by option, "OUT" first, and the values of all other parameters."""
+        outputs, others = dict[str, str](), list[Any]()
+        for each in self.params:
+            value = ctx.params.get(each.name)
+            if each.name in OUTPUTS:
+                *inputs, value = value if isinstance(value, list | tuple) and value else [value]
+                others += inputs
+                outputs = {OUT: value or "", **outputs}
+            elif each.name in OTHER_OUTPUTS:
+                outputs[each.opts[0]] = value or ""
+            else:
+                others.append(value)
+        return outputs and {**outputs, "--depfile": ctx.meta.get(DEPFILE) or ""}, others
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the tables of arguments and options."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import fields
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from anim.caches.storage import suffix
 from anim.errors import RangeError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
+from anim.gltf.io.unused_buffers import replace_text
 from anim.model import VertexCache
 
 DEFAULTS = WriteOptions()
@@ -32,7 +34,8 @@ def save(cache: VertexCache, path: str, options: WriteOptions = DEFAULTS) -> Wri
     staged = AtomicOutputs(place.parent, place.name)
     try:
         written = write(cache, staged, options)
-        staged.commit()
+        with replace_text(place) if ending == ".gltf" else nullcontext():
+            staged.commit()
     except OSError as error:
         raise not_written(path, error) from None
     finally:

@@ -7,6 +7,7 @@ command line implements them for folders and pipes.
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -36,6 +37,10 @@ class Outputs(Protocol):
 
     main: str
 
+    @property
+    def folder(self) -> os.PathLike[str] | None:
+        """Folder that the files will be in; None for none."""
+
     def create(self, name: str) -> BinaryIO:
         """Return an empty file, seekable, that becomes `name` on close."""
 
@@ -46,6 +51,7 @@ class Memory:
 
     main: str
     files: dict[str, bytes] = field(default_factory=dict)
+    folder: os.PathLike[str] | None = None
 
     def open(self, name: str) -> BinaryIO:
         """Return a file at its start."""

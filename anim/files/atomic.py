@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from anim.arrays import Bytes
 from anim.errors import OutputError, not_written
-from anim.files import before_commit, resolver, signals, special_files
+from anim.files import guard, resolver, signals, special_files
 from anim.files.folder_lock import lock_folder
 from anim.files.stream import write_stream
 
@@ -25,30 +25,31 @@ MAX_PREFIX_LENGTH = 40  # characters of the target name in a temporary name, so 
 BLOCK_BYTES = 1 << 24  # copied or compared at a time
 
 
-def write_file(path: Path, pieces: Sequence[Bytes]) -> None:
+def write_file(path: Path, pieces: Sequence[Bytes], *, in_place: bool = False) -> None:
     """Write one file atomically; for equal bytes only the modification time is updated.
 
     Links are followed; special files (/dev/null, a named pipe) are written directly, and so is what this process has
-    open (/dev/stdout, also where it leads to a file): after what others wrote there. Raises OutputError.
+    open (/dev/stdout, also where it leads to a file): after what others wrote there. in_place: the file may be the
+    input. Raises OutputError.
     """
-    with commit_after(path, pieces):
+    with commit_after(path, pieces, in_place=in_place):
         pass
 
 
 @contextmanager
-def commit_after(path: Path, pieces: Sequence[Bytes]) -> Iterator[None]:
+def commit_after(path: Path, pieces: Sequence[Bytes], *, in_place: bool = False) -> Iterator[None]:
     """Write one file like `write_file`, but rename it after the block; an error keeps the old file.
 
     So errors of this file (no permission, a full disk) are raised before the block. Other than regular files are
     written before it.
     """
-    with stage(path, pieces) as commit:
+    with stage(path, pieces, in_place=in_place) as commit:
         yield
         commit()
 
 
 @contextmanager
-def stage(path: Path, pieces: Sequence[Bytes]) -> Iterator[Callable[[], None]]:
+def stage(path: Path, pieces: Sequence[Bytes], *, in_place: bool = False) -> Iterator[Callable[[], None]]:
     """Write one file as a temporary sibling, until the end of the block; give the function that renames it.
 
     Special files are written at once.
@@ -57,7 +58,7 @@ def stage(path: Path, pieces: Sequence[Bytes]) -> Iterator[Callable[[], None]]:
     is_special = special_files.is_special(path)
 
     def commit() -> None:
-        before_commit.run_job()
+        guard.begin()
         with name_errors(path):
             if temporary is not None:
                 os.replace(temporary, target)
@@ -66,7 +67,8 @@ def stage(path: Path, pieces: Sequence[Bytes]) -> Iterator[Callable[[], None]]:
 
     with temporary_files() as made:
         if is_special:
-            before_commit.run_job()
+            guard.begin()
+        guard.plan(path, in_place=in_place)
         with name_errors(path):
             if is_special:
                 with special_files.open_special(path) as file:
@@ -106,6 +108,10 @@ class AtomicOutputs:
             handle, self.files[name] = create_temporary(path)
         return os.fdopen(handle, "w+b")
 
+    def plan(self, folder: Path) -> None:
+        """Ask whether the files may be replaced; `folder` is that which they are for."""
+        guard.plan(folder / self.main, [folder / name for name in self.names if name != self.main], in_place=True)
+
     def commit(self) -> None:
         """Rename the files that have new bytes; otherwise update the main file's time.
 
@@ -113,7 +119,8 @@ class AtomicOutputs:
         """
         import filecmp
 
-        before_commit.run_job()
+        self.plan(self.folder)
+        guard.begin()
         main = self.main if self.main in self.files else min(self.files)
         with lock_folder(self.folder):
             new = {}

@@ -6,6 +6,7 @@ import io
 import os
 import stat
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -25,13 +26,25 @@ class CompanionFiles:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._files: dict[str, Bytes] = {}
+        self._files: dict[tuple[str, int | None], Bytes] = {}
 
-    def open(self, address: str) -> Bytes:
-        """Return the bytes of a file. Raises FormatError for a missing one, or one outside the folder."""
-        if address not in self._files:
-            self._files[address] = open_relative(self._folder, address)
-        return self._files[address]
+    def __call__(self, address: str) -> Bytes:
+        """Return the bytes of a file, as `open` does."""
+        return self.open(address)
+
+    def open(self, address: str, most: int | None = None) -> Bytes:
+        """Return the bytes of a file, or its first `most` ones.
+
+        Raises FormatError for a missing file, or one outside the folder.
+        """
+        if (address, most) not in self._files:
+            self._files[address, most] = open_relative(self._folder, address, most)
+        return self._files[address, most]
+
+
+def read_head(file: BinaryIO, most: int) -> bytes:
+    """Return the first `most` bytes of an open file, or all of a shorter one. Raises as `read_all`."""
+    return file.read(min(most, os.fstat(file.fileno()).st_size)) if _has_size(file) else read_all(file)[:most]
 
 
 def read_all(file: BinaryIO) -> bytes:
@@ -105,11 +118,11 @@ def _in_folder(folder: Path, ending: str) -> str:
     return f"name a file in it, such as {name if name[0] != '-' else f'./{name}'}"  # "-x" is an option
 
 
-def open_relative(folder: Path, address: str) -> Bytes:
-    """Return the bytes of a file in or below the folder. Raises FormatError."""
+def open_relative(folder: Path, address: str, most: int | None = None) -> Bytes:
+    """Return the bytes of a file in or below the folder, or its first `most` ones. Raises FormatError."""
     path = locate(folder, address)
     try:
-        return read_file(path)
+        return read_file(path, read=read_all if most is None else partial(read_head, most=most))
     except FormatError as error:
         raise error.at(f"'{address}'", " ") from None
 

@@ -22,7 +22,7 @@ from cli.io.cache_folders import StagedFolder
 from cli.options import caches, common, meshes
 from cli.options.meshes import ABOUT, Method
 from cli.progress import announce_compiling
-from cli.reports import bake_notes
+from cli.reports import bake_notes, image_notes
 from cli.reports.bake_report import report_notes, summarize_files
 from cli.reports.rotation_notes import normalized_keys_note
 from cli.text import Reporter
@@ -171,6 +171,8 @@ def command(
     report_notes(run.files, reporter)
     normalized_keys_note({job.clip: clips[job.clip] for job in jobs if job.clip is not None}, reporter)
     run.report_findings()
+    if ending == ".gltf" and not dry_run:
+        image_notes.report(document, source, jobs[0].file, reporter)
     took = text.format_duration(time.perf_counter() - began) + (text.DRY if dry_run else "")
     reporter.info(f"{summarize_files(run.files, method.value)}, {took}")
 

@@ -17,7 +17,7 @@ from anim.check.finding import Severity
 from anim.check.rules.invalid import RULE as INVALID
 from anim.check.selection import TARGETS, rule_of
 from anim.errors import AnimError, FormatError
-from anim.files import resolver
+from anim.files import guard, resolver
 from anim.units import plural
 from cli import errors
 from cli.errors import CheckError, UsageError
@@ -174,8 +174,6 @@ def command(
         documents.write_text(check_report.budget_table(checker.headroom))
         return _worst(checker.refused, len(checker.files))
     if write_known is not None:
-        if os.path.realpath(write_known) in map(os.path.realpath, checker.files):
-            raise UsageError(f"{write_known}: --write-baseline would replace a checked file (expected another file)")
         kept = _unchecked(_written_baseline(write_known), checker.files, write_known)
         documents.write_text(baseline.dump(checker.found, _relative_to(write_known), kept), write_known)
         others = f", {kept.total()} kept of files that were not checked" if kept else ""
@@ -257,7 +255,8 @@ def _unchecked(known: Counter[str], files: Sequence[str], path: str) -> Counter[
 def _written_baseline(path: str) -> Counter[str]:
     """Counts in a baseline that is to be replaced; none if there is no baseline at `path`."""
     try:
-        return _load_baseline(path) if path != documents.PIPE and os.path.isfile(path) else Counter()
+        with guard.use(None):  # which it may replace
+            return _load_baseline(path) if path != documents.PIPE and os.path.isfile(path) else Counter()
     except FormatError:
         return Counter()
 

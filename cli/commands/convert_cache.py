@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -23,6 +22,7 @@ from cli.io import cache_files, documents
 from cli.io.cache_folders import StagedFolder
 from cli.options import caches, common
 from cli.progress import Progress, announce_compiling
+from cli.reports import image_notes
 from cli.workflows.bake_clip import Output, choose_clip, onto_source
 from cli.workflows.cache_page import check_cache_page, commit_cache_page_after
 
@@ -140,14 +140,9 @@ def command(
                 return cache_files.commit_alone(staged)
             return commit_cache_page_after(html, (input, output), staged, (), reporter, dry_run=dry_run)
 
-        def inputs() -> list[list[Path]]:
-            return [loaded.files, documents.input_files(source) if onto is not None else []]
-
         counted = _counted(cache, progress)
         try:
-            saved = cache_files.save(
-                counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with, inputs=inputs
-            )
+            saved = cache_files.save(counted, output, writing, ending=ending, dry_run=dry_run, commit_with=commit_with)
         finally:
             progress.close()
         size = loaded.size
@@ -156,6 +151,8 @@ def command(
     for words in loaded.notes:
         reporter.warn(words)
     saved.report(reporter)
+    if onto is not None and ending == ".gltf" and not dry_run:
+        image_notes.report(source.document, source, output, reporter)
     name = loaded.name if output == documents.PIPE else output
     parts = [
         f"{name}  {text.format_change(size, saved.size)}",

@@ -22,10 +22,9 @@ from anim.optimization.options import (
 )
 from cli.io import documents
 from cli.options import common
-from cli.reports import optimize_report
+from cli.reports import image_notes, optimize_report
 from cli.text import Reporter
 from cli.workflows import many_files, optimize_job, optimize_outputs
-from cli.workflows.edit_clips import note_images
 from cli.workflows.rate_curve import write_curve
 
 
@@ -195,7 +194,7 @@ def command(
 
     def edit(input: str, output: str) -> None:
         began = time.perf_counter()
-        outputs.check_paths(input, output)
+        outputs.check_paths(output)
         with documents.source(input, reporter) as source:
             optimizer = optimize_job.make_optimizer(
                 source,
@@ -220,6 +219,6 @@ def command(
                 documents.write(about.after, output, source, dry_run=dry_run, reporter=reporter)
         optimize_outputs.report_result(about, reporter, dry_run=dry_run)
         if not dry_run:
-            note_images(about.after, source, output, reporter)
+            image_notes.report(about.after, source, output, reporter)
 
     return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)

@@ -20,10 +20,11 @@ from anim.caches.temporary_files import temporary_folder
 from anim.errors import AnimError, DataRangeError, FormatError, OutputError, not_written
 from anim.files import resolver
 from anim.files.atomic import AtomicOutputs
+from anim.gltf.io.unused_buffers import replace_text
 from anim.model import VertexCache
 from anim.units import plural
 from cli.errors import UsageError
-from cli.io import cache_folders, depfile, documents
+from cli.io import cache_folders, command_files, documents
 from cli.text import Reporter
 
 STDIN = "stdin"
@@ -142,15 +143,12 @@ def save(
     ending: str,
     dry_run: bool = False,
     commit_with: CommitWith = commit_alone,
-    inputs: Callable[[], Sequence[Sequence[Path]]] = lambda: (),
 ) -> SavedCache:
     """Write a cache, "-" for stdout, in the format that `check` returned.
 
     Companion files (a rest mesh) are left out on stdout, with a note.
     commit_with: makes other outputs of the written files, and replaces theirs after the cache's: an error of it leaves
     all files as they were. Not called for stdout.
-    inputs: gives the files of which the cache is made, once it is written: those of each input, its main file first.
-    Raises UsageError where a companion of the output would replace one of them.
     """
     is_pipe = path == documents.PIPE
     if is_pipe and CACHE_FORMATS[ending].files is Files.FRAMES and cache.frame_count > 1:
@@ -158,6 +156,7 @@ def save(
             f"stdout: {ending[1:]} is a file a frame, of {cache.frame_count} (expected a file name)",
             help="convert-cache --at takes one of them",
         )
+    unused: tuple[str, ...] = ()
     with ExitStack() as stack:
         away = stack.enter_context(temporary_folder()) if is_pipe or dry_run else ""
         staged = cache_folders.outputs(path, away, dry_run=dry_run)
@@ -168,44 +167,29 @@ def save(
             if is_pipe and not dry_run:
                 cache_folders.to_stdout(staged)
             elif not is_pipe:
-                if CACHE_FORMATS[ending].files is not Files.FRAMES:
-                    _check_companions(staged, path, inputs())
                 with commit_with(cache_folders.StagedFolder(staged)):
-                    if not dry_run:
-                        _commit(staged, path)
+                    unused = _commit(staged, path, ending, dry_run=dry_run)
         except OSError as error:
             raise not_written(away if is_pipe else path, error) from None
         finally:
             staged.clear()
     lost = unsupported_notes(cache, ending)
-    left = unwritable_note(staged.names[:-1]) if is_pipe else ()
+    left = unwritable_note(staged.names[:-1]) if is_pipe else unused
     orphans = () if is_pipe else orphan_warnings(path, names, ending)
     return SavedCache(names, size, replace(written, notes=(*written.notes, *lost, *left)), orphans)
 
 
-def _check_companions(staged: AtomicOutputs, path: str, inputs: Sequence[Sequence[Path]]) -> None:
-    """Raise UsageError if an input is replaced by a file beside the output, whose name nobody gave.
-
-    inputs: files that belong together, the main one first: one that is the output is replaced with its companions.
-    """
-    folder = os.path.dirname(os.path.realpath(path))
-    beside = {os.path.join(folder, name) for name in staged.names if name != staged.main}
-    for files in inputs:
-        if files and os.path.realpath(files[0]) == os.path.realpath(path):
-            continue
-        for each in files:
-            own = os.path.join(os.path.realpath(each.parent), each.name)  # a link is replaced itself
-            if not beside.isdisjoint((own, os.path.realpath(each))):
-                raise UsageError(
-                    f"{each}: would be replaced by the file of this name beside {path}",
-                    help="choose another name for OUT",
-                )
-
-
-def _commit(staged: AtomicOutputs, path: str) -> None:
+def _commit(staged: AtomicOutputs, path: str, ending: str, *, dry_run: bool) -> tuple[str, ...]:
+    """Replace the files; return notes on buffers of a replaced .gltf that it doesn't use any more."""
+    target, notes = resolver.resolve_links(Path(path)), list[str]()
+    if dry_run:
+        staged.plan(target.parent)
+        return ()
     if staged.main not in staged.names:  # a file a frame: a rule of the name itself would always be out of date
-        depfile.add_output(path, os.path.join(os.path.dirname(path), min(staged.names)))
-    staged.commit()
+        command_files.add_output(path, os.path.join(os.path.dirname(path), min(staged.names)))
+    with replace_text(target, command_files.inputs(), notes.append) if ending == ".gltf" else nullcontext():
+        staged.commit()
+    return tuple(notes)
 
 
 def _ending(inputs: cache_folders.CacheFolder) -> str:

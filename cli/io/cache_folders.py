@@ -22,7 +22,7 @@ from anim.files.atomic import AtomicOutputs
 from anim.files.special_files import descriptor_of
 from anim.memory import limit_for
 from cli.errors import UsageError
-from cli.io import depfile, documents
+from cli.io import command_files, documents
 
 
 def inputs(path: str, stack: ExitStack) -> CacheFolder:
@@ -43,7 +43,7 @@ def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     target = Path(path) if descriptor_of(Path(path)) is not None else resolver.resolve_links(Path(path))
     folder = Path(away) if dry_run or is_pipe else target.parent
     if not dry_run and not is_pipe:
-        depfile.add_output(path)
+        command_files.add_output(path)
     return AtomicOutputs(folder, "stdout" if is_pipe else target.name)
 
 
@@ -69,7 +69,7 @@ class CacheFolder:
             if path.is_dir():
                 raise FormatError("is a folder")
             file = path.open("rb")
-            depfile.add_inputs(path)
+            command_files.add_companions(self._folder / self.main, path)
             self.sizes[name] = os.fstat(file.fileno()).st_size
             return file
         except OSError as error:

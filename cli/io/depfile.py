@@ -3,47 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
-from pathlib import Path
+from collections.abc import Sequence
 
 # With these make takes the line for two lines, a variable, a recipe, or the start of what is needed only first.
 UNESCAPABLE = {"\n": "a line break", "\r": "a line break", "=": "'='", ";": "';'", "|": "'|'"}
-
-
-class FileRecord:
-    """Files that a command read and wrote, by the names that it used for them."""
-
-    def __init__(self) -> None:
-        self.inputs: dict[str, None] = {}  # in order
-        self.outputs: dict[str, str] = {}  # files of rules, by the names of outputs
-
-
-_record: ContextVar[FileRecord | None] = ContextVar("files", default=None)
-
-
-@contextmanager
-def record_files() -> Iterator[FileRecord]:
-    """Record the files that the block reads and writes."""
-    record = FileRecord()
-    token = _record.set(record)
-    try:
-        yield record
-    finally:
-        _record.reset(token)
-
-
-def add_inputs(*paths: Path) -> None:
-    """Record files that were read."""
-    if (record := _record.get()) is not None:
-        record.inputs.update(dict.fromkeys(map(str, paths)))
-
-
-def add_output(path: str, written: str = "") -> None:
-    """Record a file that was written. written: the file itself where none has the name of the output."""
-    if (record := _record.get()) is not None:
-        record.outputs[path] = written or path
 
 
 def rule(outputs: Sequence[str], inputs: Sequence[str]) -> str:

@@ -34,7 +34,7 @@ from anim.gltf.validation.extensions import PHYSICS, unknown_required
 from anim.units import list_some
 from cli import tables
 from cli.errors import UsageError
-from cli.io import depfile, output_names, stdout
+from cli.io import command_files, output_names, stdout
 from cli.streams import locate, record_files, step_streams
 from cli.text import Reporter
 
@@ -181,11 +181,6 @@ def commit_text_after(text: str | bytes, path: str) -> Iterator[None]:
             yield
 
 
-def input_files(source: Source) -> list[Path]:
-    """Return the paths of an input and of its buffers and images; none for stdin."""
-    return [] if source.folder is None else [Path(source.name), *external_files(source)]
-
-
 def check_output(path: str, *, dry_run: bool = False) -> None:
     """Raise UsageError or OutputError if glTF can't be written to `path` or its extension is another format's.
 
@@ -267,7 +262,7 @@ def _open_file(path: str, opener: Opener) -> Source:
     located = locate(path)
     found = open_file(located, opener)
     record_files(Path(located), *buffer_files(found))
-    depfile.add_inputs(Path(located), *filter(os.path.isfile, external_files(found)))
+    command_files.add_inputs(Path(located), *filter(os.path.isfile, external_files(found)))
     return found._replace(name=path)
 
 
@@ -276,7 +271,7 @@ def _read_file(path: str, ending: str, read: Callable[[io.BufferedReader], bytes
     located = Path(locate(path))
     found = resolver.read_file(located, ending, read=read)
     record_files(located)
-    depfile.add_inputs(located)
+    command_files.add_inputs(located)
     return found
 
 

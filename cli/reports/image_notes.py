@@ -8,10 +8,20 @@ from pathlib import Path
 from anim.errors import FormatError
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import uri
-from anim.gltf.io.images import external_uri, read_image
+from anim.gltf.io.images import external_uri, find_image, locate_image
+from anim.gltf.io.source import Source
 from anim.units import plural
+from cli.io import documents
+from cli.text import Reporter
 
 MAX_LISTED_NAMES = 3  # names in a note
+
+
+def report(document: Document, source: Source, output: str, reporter: Reporter) -> None:
+    """Report the images of a written document that were copied to the output's folder, and the missing ones."""
+    if output != documents.PIPE and not source.is_in_folder(output):
+        for note in notes(document, source.folder, copied=True):
+            reporter.info(note)
 
 
 def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: str = "") -> Iterator[str]:
@@ -20,13 +30,20 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
     copied: whether the readable ones were copied. embed_hint: the hint on embedding them.
     """
     outside = [image for image in json_array(document.json, "images") if external_uri(image)]
-    lost = [image["uri"] for image in outside if read_image(folder, image) is None]
-    found = [image["uri"] for image in outside if image["uri"] not in lost]
+    lost = [image["uri"] for image in outside if locate_image(folder, image) is None]
+    found = [image["uri"] for image in outside if find_image(folder, image) is not None]
+    others = [image["uri"] for image in outside if image["uri"] not in (*lost, *found)]
     if found and copied:
         yield f"note: {plural(len(found), 'image')} copied beside the output ({_listed(found)})"
     elif found:
         verb = "stays" if len(found) == 1 else "stay"
         yield f"note: {plural(len(found), 'image')} {verb} outside ({_listed(found)}); {embed_hint}"
+    if others:
+        words = "is" if len(others) == 1 else "are"
+        yield (
+            f"note: {plural(len(others), 'image')} {words} left out, since name or first bytes of the file are "
+            f"those of no image ({_listed(others)})"
+        )
     away = [address for address in lost if folder is not None and _is_outside(address)]
     if away:
         words = "refers" if len(away) == 1 else "refer"

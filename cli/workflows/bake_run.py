@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any
 
 from anim.caches.transforms import statistics, up_axis, vertex_order
@@ -18,7 +18,7 @@ from anim.skinning.analysis.method_deviation import Deviation, MeasuredBake, lin
 from anim.skinning.uneven import UnevenScale
 from cli import units
 from cli.errors import UsageError
-from cli.io import cache_files, documents
+from cli.io import cache_files
 from cli.io.cache_files import CommitWith, SavedCache, commit_alone
 from cli.io.cache_folders import StagedFolder
 from cli.options import caches
@@ -58,26 +58,13 @@ class FileOptions:
             cache = vertex_order.reorder(cache, str(self.vertex_order))
         return cache if self.up is None else up_axis.to_up_axis(cache, str(self.up))
 
-    def save(
-        self, cache: VertexCache, file: str, source: Mapping[str, Any], commit_with: CommitWith, inputs: Sequence[Path]
-    ) -> SavedCache:
-        """Write a cache, and other outputs as `cache_files.save`.
-
-        source: the option of formats that keep materials. inputs: files of the model.
-        """
+    def save(self, cache: VertexCache, file: str, source: Mapping[str, Any], commit_with: CommitWith) -> SavedCache:
+        """Write a cache, and other outputs as `cache_files.save`. source: the option of formats that keep materials."""
         error = None
         if self.max_error is not None:
             error = units.parse_length(self.max_error, "--max-error", lambda: statistics.diagonal(cache))
         options = caches.write_options(self.ending, {**self.values, "max_error": error, **source})
-        return cache_files.save(
-            cache,
-            file,
-            options,
-            ending=self.ending,
-            dry_run=self.dry_run,
-            commit_with=commit_with,
-            inputs=lambda: [inputs],
-        )
+        return cache_files.save(cache, file, options, ending=self.ending, dry_run=self.dry_run, commit_with=commit_with)
 
 
 class GroupBaker:
@@ -108,7 +95,6 @@ class BakeRun:
         commit_with: CommitWith = commit_alone,
     ) -> None:
         self.files: list[BakedFile] = []
-        self._input_files = documents.input_files(source)
         self._source, self._scene, self._options = source, scene, options
         self._file_options, self._reporter, self._commit_with = file_options, reporter, commit_with
         self._group: tuple[int, GroupBaker] | None = None
@@ -154,7 +140,7 @@ class BakeRun:
             return self._commit_with(staged)
 
         try:
-            saved = self._file_options.save(cache, job.file, source, commit_with, self._input_files)
+            saved = self._file_options.save(cache, job.file, source, commit_with)
         finally:
             progress.close()
         if measured is not None:

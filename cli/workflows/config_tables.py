@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 from anim.errors import FormatError, UnsupportedError
 from anim.files.special_files import is_device_or_pipe, open_regular
 from cli.errors import UsageError
+from cli.io import command_files
 from cli.tables import cut_middle
 
 NAME, PROJECT = "gltf-anim.toml", "pyproject.toml"
@@ -98,6 +99,7 @@ def _read(path: Path) -> bytes:
         raise FormatError("is no regular file", where=str(path))
     with open_regular(path) as file:
         data = file.read(MAX_BYTES + 1)
+    command_files.add_inputs(path)
     if len(data) > MAX_BYTES:
         raise UnsupportedError(f"has more than {MAX_BYTES / 1e6:.0f} MB (settings are short)", where=str(path))
     if _key_work(data) > MAX_KEY_WORK:

@@ -149,7 +149,7 @@ def edit_together(
             result, output, source, unchanged=source.bytes_of(result), dry_run=dry_run, reporter=reporter
         )
     if not dry_run:
-        note_images(result, source, output, reporter)
+        image_notes.report(result, source, output, reporter)
     name = source.name if output == documents.PIPE else output
     if not new:
         why = "no track was changed" if clips else "it has no clips"
@@ -261,13 +261,6 @@ def _error(found: Proof, diagonal: float) -> str:
 
 def _keys(clip: Clip) -> int:
     return sum(len(track.times) for track in clip.tracks)
-
-
-def note_images(document: Document, source: Source, output: str, reporter: text.Reporter) -> None:
-    """Report the images copied to the output's folder, and the missing ones."""
-    if output != documents.PIPE and not source.is_in_folder(output):
-        for note in image_notes.notes(document, source.folder, copied=True):
-            reporter.info(note)
 
 
 def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePath
+from pathlib import PurePath
 
 from anim.gltf.io import container
 from anim.gltf.io.source import Source
@@ -43,14 +43,16 @@ class OptimizeOutputs:
             if out is not None or self.curve is not None:
                 raise UsageError(f"--html goes with neither --{'out' if self.curve is None else 'curve'}")
 
-    def check_paths(self, input: str, output: str) -> None:
-        """Raise before any work for outputs that can't be written or are another file of the command."""
+    def check_paths(self, output: str) -> None:
+        """Raise before any work for outputs that can't be written, or a report with the name of a model."""
         if self.curve is not None:
             check_curve_file(self.curve)
         elif not self.dry_run:
             documents.check_output(output)
         if self.report is not None and self.report != documents.PIPE:
-            _check_report(self.report, input, output)
+            documents.check_file(self.report)
+            if PurePath(self.report).suffix.lower() in (*container.SUFFIXES, ".bin"):
+                raise UsageError(f"{self.report}: --report would take the place of a model (expected a .json file)")
         if self.report == output == documents.PIPE and self.curve is None and not self.dry_run:
             raise UsageError("--report and OUT can't both be stdout")
 
@@ -100,15 +102,6 @@ def report_result(about: optimize_report.OptimizeReport, reporter: Reporter, *, 
         reporter.warn(words)
     for line in optimize_report.details(about) if reporter.verbose else ():
         reporter.verbose_info(line)
-
-
-def _check_report(report: str, input: str, output: str) -> None:
-    """Raise UsageError for a report path that is a model's."""
-    documents.check_file(report)
-    if PurePath(report).suffix.lower() in (*container.SUFFIXES, ".bin") or Path(report).resolve() in {
-        Path(other).resolve() for other in (input, output) if other != documents.PIPE
-    }:
-        raise UsageError(f"{report}: --report would take the place of a model (expected a .json file of its own)")
 
 
 @contextmanager

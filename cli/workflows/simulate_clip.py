@@ -17,8 +17,8 @@ from anim.simulation.report import SimulationReport
 from cli import text
 from cli.errors import UsageError
 from cli.io import documents, scenes
+from cli.reports import image_notes
 from cli.text import Reporter
-from cli.workflows.edit_clips import note_images
 from cli.workflows.simulation_report import check_report, commit_report_after, write_report
 
 NO_CLIP = Clip("", ())
@@ -69,7 +69,7 @@ def simulate_clip(
             else:
                 size = documents.write(result, output, source, dry_run=dry_run, reporter=reporter)
     if not dry_run and not isinstance(result, bytes):
-        note_images(result, source, output, reporter)
+        image_notes.report(result, source, output, reporter)
     name = source.name if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     nothing = " (dry run: nothing written)" if dry_run else ""

@@ -22,7 +22,7 @@ def test_it_is_the_glb(call: Call, tmp_path: Path, layout: str) -> None:
         assert call("bake", source, tmp_path / name, "--clip", "bend", "--layout", layout).code == 0
     text, binary = opened_path(tmp_path / "a.gltf"), opened_path(tmp_path / "b.glb")
     assert {**text.json, "buffers": 0} == {**binary.json, "buffers": 0}
-    assert text.json["buffers"][0]["uri"] == "a.gltf.bin"
+    assert text.json["buffers"][0]["uri"] == "a.bin"
     assert np.array_equal(text.buffers[0].data, binary.buffers[0].data)
     assert looks(text) == looks(binary)
 

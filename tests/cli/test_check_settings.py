@@ -105,7 +105,10 @@ def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> Non
 
 @pytest.mark.parametrize(
     ("name", "problem", "code"),
-    [("crowd/../noop.glb", "would replace a checked file", 2), ("none/a.json", "there is no folder", 3)],
+    [
+        ("crowd/../noop.glb", "--write-baseline would replace an input", 2),
+        ("none/a.json", "there is no folder", 3),
+    ],
 )
 def test_a_baseline_replaces_no_checked_file(name: str, problem: str, code: int, folder: Path, call: Call) -> None:
     before = (folder / "noop.glb").read_bytes()

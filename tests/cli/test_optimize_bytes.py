@@ -263,6 +263,6 @@ def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: 
     source.write_bytes(fixture("arm").read_bytes())
     for dry in ((), ("-n",)):
         run = call("optimize", source, tmp_path / "out", "--report", tmp_path / "." / place, *dry, *FAST)
-        assert "--report would take the place of a model" in refusal(run, 2)
+        assert f"--report would replace {'OUT' if place == 'out' else 'an input'}" in refusal(run, 2)
     assert source.read_bytes() == fixture("arm").read_bytes()
     assert not (tmp_path / "out").exists()

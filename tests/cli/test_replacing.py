@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+import anim
 from tests.cli.conftest import Call, Find
 from tests.cli.running import ENVIRONMENT, ROOT, TIMEOUT, built, refusal, shell
 from tests.files import mark_slow
@@ -198,18 +199,35 @@ def test_links_are_written_through(call: Call, walk: Path, tmp_path: Path) -> No
     assert sorted(path.name for path in (tmp_path / "real").iterdir()) == ["new.glb", "out.glb"]
 
 
-def test_a_buffer_of_an_input_is_not_replaced_by_that_of_the_output(call: Call, tmp_path: Path) -> None:
-    """Which has the name that the buffer of another output had."""
+def test_a_baked_gltf_takes_a_free_name_for_its_buffer(call: Call, tmp_path: Path) -> None:
+    """That of a .gltf may be the buffer of another one, also of the input."""
     call("bake", walk_of(tmp_path), tmp_path / "k.gltf", "--clip", "bend", "--fps", "5").product()
     (tmp_path / "k.gltf").rename(tmp_path / "m.gltf")
+    call("bake", tmp_path / "arm.glb", tmp_path / "c.npz", "--clip", "bend", "--fps", "4").product()
     before = contents(tmp_path)
-    run = call("bake", tmp_path / "m.gltf", tmp_path / "k.gltf", "--rigid", "--fps", "5")
-    assert f"{tmp_path / 'k.gltf.bin'}: would be replaced by the file of this name beside" in refusal(run, 2)
-    call("bake", tmp_path / "arm.glb", tmp_path / "c.npz", "--clip", "bend", "--fps", "5").product()
-    run = call("convert-cache", tmp_path / "c.npz", tmp_path / "k.gltf", "--onto", tmp_path / "m.gltf")
-    assert "k.gltf.bin: would be replaced" in refusal(run, 2)
-    assert {name: data for name, data in contents(tmp_path).items() if name != "c.npz"} == before
-    call("bake", tmp_path / "m.gltf", tmp_path / "m.gltf", "--rigid", "--fps", "5").product()  # in place
+    line = ("bake", tmp_path / "m.gltf", tmp_path / "k.gltf", "--rigid", "--fps", "4")
+    call(*line).product()
+    assert before.items() <= contents(tmp_path).items()
+    made = contents(tmp_path)
+    assert len(made) == len(before) + 2
+    call(*line).product()
+    assert contents(tmp_path) == made
+    assert "max 0" in call("diff", tmp_path / "k.gltf", tmp_path / "k.gltf").text
+    call("convert-cache", tmp_path / "c.npz", tmp_path / "k.gltf", "--onto", tmp_path / "arm.glb").product()
+    assert before.items() <= contents(tmp_path).items()
+    assert len(contents(tmp_path)) == len(made)  # an old buffer is removed
+    call("bake", tmp_path / "m.gltf", tmp_path / "m.gltf", "--rigid", "--fps", "3").product()  # in place
+
+
+def test_the_library_names_the_buffer_of_a_cache_so_too(tmp_path: Path) -> None:
+    asset = anim.load(walk_of(tmp_path))
+    for fps in (5, 4, 4):
+        anim.bake(asset, "bend", fps=fps).save(tmp_path / "k.gltf")
+        (buffer,) = tmp_path.glob("*.bin")
+    assert buffer.name.startswith("k-")
+    (tmp_path / "k.gltf").unlink()
+    anim.bake(asset, "bend", fps=3).save(tmp_path / "k.gltf")
+    assert {each.name for each in tmp_path.glob("*.bin")} == {"k.bin", buffer.name}
 
 
 def walk_of(folder: Path) -> Path:

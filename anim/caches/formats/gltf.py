@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import PurePath
 from typing import TypeAlias
 
 import numpy as np
@@ -11,10 +12,11 @@ import numpy as np
 from anim.caches.formats import gltf_flipbook, gltf_morph
 from anim.caches.formats.flipbook_reader import read_pages
 from anim.caches.options import ReadOptions, WriteOptions, WriteResult
-from anim.caches.storage import Inputs, Memory, Outputs, companion_name, open_bytes
+from anim.caches.storage import Inputs, Memory, Outputs, open_bytes
 from anim.errors import NotFoundError, RangeError
 from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container
+from anim.gltf.io.gltf_files import BufferNames
 from anim.gltf.reading import reader
 from anim.model import Clip, VertexCache
 from anim.sampling import frame_times
@@ -44,7 +46,7 @@ def check_frames(frames: int, vertices: int, writing: WriteOptions) -> None:
 
 
 def write_with_buffers(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
-    """Write a .gltf in the layout `writing.layout`, and its buffers beside it, named after it ("walk.gltf.bin").
+    """Write a .gltf in the layout `writing.layout`, and its buffers beside it, named as by `gltf_files`.
 
     Images stay as the source has them: those in files are not copied.
     """
@@ -53,16 +55,16 @@ def write_with_buffers(cache: VertexCache, outputs: Outputs, writing: WriteOptio
     document = container.read(np.frombuffer(memory.files[memory.main], np.uint8))
     if writing.source is None:  # its first bytes name the format
         document = replace(document, json={"asset": document.json["asset"], **document.json})
-    files = container.gltf(document, "cache", choose=lambda number, _, __: _buffer_name(outputs.main, number))
+    stem = PurePath(outputs.main).stem
+    if outputs.folder is None:
+        files = container.gltf(document, stem)
+    else:
+        files = container.gltf(document, stem, choose=BufferNames.of_file(outputs.folder, outputs.main).choose)
     for name, pieces in files.items():
-        with outputs.create(outputs.main if name == "cache.gltf" else name) as file:
+        with outputs.create(outputs.main if name == f"{stem}.gltf" else name) as file:
             for piece in pieces:
                 file.write(piece.data)
     return result
-
-
-def _buffer_name(main: str, number: int) -> str:
-    return companion_name(main, f"-{number}.bin" if number else ".bin")
 
 
 def read(inputs: Inputs, reading: ReadOptions) -> VertexCache:

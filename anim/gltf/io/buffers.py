@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import numpy as np
 
 from anim.errors import FormatError, ShapeError
+from anim.files.resolver import CompanionFiles
 from anim.gltf.document import Buffer, Bytes, Json, json_array
 from anim.gltf.io import uri
 
@@ -22,32 +23,38 @@ def buffers_of(
 
     check: raise FormatError for a BIN chunk that is missing or shorter than the first buffer.
     """
-    buffers = []
+    buffers, lengths = [], dict[str, int]()
+    for about in json_array(parsed, "buffers"):
+        address = about.get("uri", "")
+        lengths[address] = max(lengths.get(address, 0), about["byteLength"])
     for i, about in enumerate(json_array(parsed, "buffers")):
-        load, where = _loader(about, binary if i == 0 else None, resolve), f"buffer {i}"
+        load, where = _loader(about, binary if i == 0 else None, resolve, lengths), f"buffer {i}"
         buffers.append(Buffer(about["byteLength"], about.get("uri"), load, where=where))
         if check and glb and i == 0 and "uri" not in about:
             _check_binary(about, binary)
     return tuple(buffers)
 
 
-def _loader(about: Json, binary: Bytes | None, resolve: Resolve | None) -> Callable[[], Bytes] | None:
+def _loader(
+    about: Json, binary: Bytes | None, resolve: Resolve | None, lengths: Mapping[str, int]
+) -> Callable[[], Bytes] | None:
     address = about.get("uri")
     if address is None:
         return None if binary is None else lambda: binary
     if uri.is_data(address):
         return lambda: as_bytes(uri.decode_data(address))
-    return lambda: _read_external(address, resolve)
+    return lambda: _read_external(address, resolve, lengths[address])
 
 
-def _read_external(address: str, resolve: Resolve | None) -> Bytes:
+def _read_external(address: str, resolve: Resolve | None, length: int) -> Bytes:
+    """The bytes of a file. length: the largest byteLength of its buffers: a file may be longer by gigabytes."""
     path = uri.relative_path(address)
     if resolve is None:
         raise FormatError(
             f"the bytes of '{path}' are not given",
             help="container.read(data, resolve=…) takes a function that reads it",
         )
-    given = resolve(path)
+    given = resolve.open(path, length) if isinstance(resolve, CompanionFiles) else resolve(path)
     data = as_array(given)
     if data is None:
         raise ShapeError(

@@ -9,19 +9,17 @@ Buffers that the replaced .gltf no longer uses are removed last, if this program
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import TypeAlias
 
 from anim.errors import OutputError
-from anim.files import atomic, before_commit, resolver, signals, special_files
+from anim.files import atomic, guard, resolver, signals, special_files
 from anim.files.folder_lock import lock_folder
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container, unused_buffers
-
-Note: TypeAlias = Callable[[str], object]
+from anim.gltf.io.unused_buffers import Note
 
 
 def write(
@@ -45,17 +43,18 @@ def write(
     if special_files.is_special(named):
         raise OutputError(f"{named}: is no plain file (a .gltf needs a folder for its buffers)", help="write a .glb")
     with nullcontext() if dry_run else lock_folder(path.parent):
-        names = _Names(path.parent, unused_buffers.external_buffers(path))
+        names = BufferNames.of_file(path.parent, path.name)
         files = container.gltf(document, path.stem, keep_external=same_folder, choose=names.choose)
         made = files.pop(f"{path.stem}.gltf")
         content = made if text is None or files else [text]
+        guard.plan(path, in_place=True)
+        guard.plan_new(path.parent / name for name in files)
         if not dry_run:
             with atomic.name_errors(named):
                 atomic.check_writable(path)
                 new = {path.parent / name: pieces for name, pieces in files.items() if name not in names.reused}
                 _commit(path, content, new)
-                for name in unused_buffers.remove_unused(names.old, path, content, spared):
-                    note(f"'{name}' is not used by {path.name} any more; delete it if nothing else needs it")
+                unused_buffers.remove_unused(names.old, path, content, spared, note)
     return sum(len(piece) for pieces in (content, *files.values()) for piece in pieces)
 
 
@@ -73,11 +72,11 @@ def remove(paths: Sequence[Path], spared: Sequence[Path] = ()) -> None:
             path.unlink(missing_ok=True)
     for path, old in buffers.items():
         with lock_folder(path.parent), atomic.name_errors(path):
-            unused_buffers.remove_unused(old, path, (), spared)
+            unused_buffers.remove_unused(old, path, (), spared, note=lambda words: None)
 
 
 @dataclass
-class _Names:
+class BufferNames:
     """Names of new buffers in a folder.
 
     old: buffers of the existing .gltf, "" for those that are not files. reused: chosen names of existing files with the
@@ -87,6 +86,11 @@ class _Names:
     folder: Path
     old: Sequence[str]
     reused: set[str] = field(default_factory=set)
+
+    @classmethod
+    def of_file(cls, folder: os.PathLike[str], name: str) -> BufferNames:
+        """Return the names for the .gltf of this name."""
+        return cls(Path(folder), unused_buffers.external_buffers(Path(folder, name)))
 
     def choose(self, number: int, preferred: str, data: Bytes) -> str:
         """Return the name for buffer `number`: an existing file with equal bytes, else a free name."""
@@ -121,7 +125,7 @@ def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> N
         waiting = {place: atomic.write_temporary(place, pieces, made) for place, pieces in new.items()}
         is_there = atomic.has_bytes(path, text)
         main = None if is_there else atomic.write_temporary(path, text, made)
-        before_commit.run_job()
+        guard.begin()
         with signals.hold_signals(), atomic.temporary_files() as placed:
             for place, temporary in waiting.items():
                 atomic.move_to_free(temporary, place)

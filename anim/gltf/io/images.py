@@ -1,53 +1,76 @@
-"""External images of a glTF: copied to the output's folder or embedded in the file."""
+"""External images of a glTF: copied to the output's folder or embedded in the file.
+
+Only files that are images by name and by first bytes: a document can name any file beside it as its image, and where a
+copy lies, other programs may take it for settings or code (`pyproject.toml`, `.bash_login`).
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
+import numpy as np
+
 from anim.errors import FormatError, OutputError
-from anim.files import atomic, before_commit, resolver
+from anim.files import atomic, guard, resolver
+from anim.files.special_files import open_regular
 from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
 
+SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".gif", ".bmp", ".ktx2", ".dds")
+# By place in the file; the first two are glTF's own, the others those of its extensions, and what loaders show too
+SIGNATURES = (
+    (0, b"\x89PNG", "image/png"),
+    (0, b"\xff\xd8", "image/jpeg"),
+    (8, b"WEBP", "image/webp"),
+    (4, b"ftypavi", "image/avif"),
+    (0, b"\xabKTX 20", "image/ktx2"),
+    (0, b"DDS ", "image/vnd-ms.dds"),
+    (0, b"GIF8", "image/gif"),
+    (0, b"BM", "image/bmp"),
+)
+HEAD_BYTES = 12  # that have every signature
 
-def copy_images(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Bytes]]:
-    """Return a document moved from `folder` to `target`, and the images to copy, by path.
+
+def copy_images(document: Document, folder: Path, target: Path) -> tuple[Document, dict[Path, Path]]:
+    """Return a document moved from `folder` to `target`, and the images to copy: their files by new path.
 
     They keep their relative paths, and the URIs are unchanged. If another file has the name, the copy is named after
-    its content (`skin-1a2b3c4d.png`). References to images that cannot be read are unchanged.
+    its content (`skin-1a2b3c4d.png`). References to what is no image, or can't be read, are unchanged.
     """
-    copies: dict[Path, Bytes] = {}
+    copies: dict[Path, Path] = {}
     images: list[Json] = []
     for image in json_array(document.json, "images"):
-        address, data = external_uri(image), read_image(folder, image)
-        if data is not None and address:
-            name = _free(target, uri.relative_path(address), data, copies)
-            copies[target / name] = data
-            image = image if name == uri.relative_path(address) else {**image, "uri": uri.from_path(name)}
+        if (file := find_image(folder, image)) is not None:
+            own = uri.relative_path(image["uri"])
+            name = _free(target, own, file, copies)
+            copies[target / name] = file
+            image = image if name == own else {**image, "uri": uri.from_path(name)}
         images.append(image)
     changed = replace(document, json={**document.json, "images": images}) if copies else document
     return changed, copies
 
 
-def write_copies(copies: Mapping[Path, Bytes], within: Path | None = None) -> None:
-    """Write images to free names; an existing file there has the same bytes. Raises OutputError.
+def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> None:
+    """Copy images to free names; an existing file there has the same bytes. Raises OutputError.
 
     within: a folder that none of them may leave by a link.
     """
-    if copies:
-        before_commit.run_job()
     if within is not None:
         for path in copies:
             _check_place(path, within)
-    for path, data in copies.items():
+    if copies:
+        guard.plan_new(copies)
+        guard.begin()
+    for path, file in copies.items():
         with atomic.name_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             if not path.exists():
                 with atomic.temporary_files() as made:
-                    atomic.move_to_free(atomic.write_temporary(path, [data], made), path)
+                    atomic.move_to_free(atomic.write_temporary(path, _blocks(file), made), path)
 
 
 def _check_place(path: Path, folder: Path) -> None:
@@ -57,9 +80,9 @@ def _check_place(path: Path, folder: Path) -> None:
 
 
 def embed(document: Document, folder: Path | None) -> Document:
-    """Return the document with its readable external images as data URIs."""
+    """Return the document with its external images as data URIs, as far as they are images that can be read."""
     images = [
-        image if (data := read_image(folder, image)) is None else {**image, "uri": _data_uri(data)}
+        image if (file := find_image(folder, image)) is None else {**image, "uri": _data_uri(file)}
         for image in json_array(document.json, "images")
     ]
     return replace(document, json={**document.json, "images": images}) if images else document
@@ -71,42 +94,70 @@ def external_uri(image: Json) -> str:
     return "" if uri.is_data(address) else address
 
 
-def read_image(folder: Path | None, image: Json) -> Bytes | None:
-    """Return the bytes of an external image; None for others, or if the file cannot be read."""
+def find_image(folder: Path | None, image: Json) -> Path | None:
+    """Return the file of an external image; None for others, for no image, or if it can't be read."""
+    file = locate_image(folder, image)
+    if file is None or not _is_image_name(uri.relative_path(image["uri"])):
+        return None
+    try:
+        with open_regular(file) as opened:
+            return file if media_type(opened.read(HEAD_BYTES)) else None
+    except OSError:
+        return None
+
+
+def locate_image(folder: Path | None, image: Json) -> Path | None:
+    """Return the file that an external image names, of any kind; None if there is none in the folder or below."""
     address = external_uri(image)
     if not address or folder is None:
         return None
     try:
-        return resolver.open_relative(folder, uri.relative_path(address))
+        return resolver.locate(folder, uri.relative_path(address))
     except FormatError:
         return None
 
 
-def _free(target: Path, name: str, data: Bytes, copies: Mapping[Path, Bytes]) -> str:
-    """The free name for a copy in the folder."""
-    import hashlib
+def media_type(head: bytes) -> str:
+    """Return the media type of an image by its first bytes (`HEAD_BYTES`); "" for what is none."""
+    return next((media for at, magic, media in SIGNATURES if head.startswith(magic, at)), "")
 
-    digest = hashlib.sha256(data.data).hexdigest()
-    path = PurePosixPath(name)
-    for each in (name, *(str(path.with_name(f"{path.stem}-{digest[:n]}{path.suffix}")) for n in (8, 16, 64))):
-        if target / each in copies or not os.path.lexists(target / each) or atomic.has_bytes(target / each, [data]):
+
+def _is_image_name(path: str) -> bool:
+    """Return whether a relative path ends as that of an image, and no part of it is hidden."""
+    hidden = any(part.startswith(".") and part != "." for part in re.split(r"[/\\]", path))
+    return not hidden and path.lower().endswith(SUFFIXES)
+
+
+def _free(target: Path, name: str, file: Path, copies: Mapping[Path, Path]) -> str:
+    """The free name for a copy in the folder."""
+    for each in _candidates(name, file):
+        if target / each in copies or not os.path.lexists(target / each) or _is_same(target / each, file):
             return each
     raise OutputError(f"{target / name}: is there already, with other content")
 
 
-def _data_uri(data: Bytes) -> str:
-    return uri.encode_data(data.tobytes(), media_type(data))
+def _candidates(name: str, file: Path) -> Iterator[str]:
+    import hashlib
+
+    yield name
+    with file.open("rb") as opened:
+        digest = hashlib.file_digest(opened, "sha256").hexdigest()
+    path = PurePosixPath(name)
+    yield from (str(path.with_name(f"{path.stem}-{digest[:n]}{path.suffix}")) for n in (8, 16, 64))
 
 
-def media_type(data: Bytes) -> str:
-    """Return the media type of an image by its first bytes; application/octet-stream if unknown."""
-    head = data[:12].tobytes()
-    if head.startswith(b"\x89PNG"):
-        return "image/png"
-    if head.startswith(b"\xff\xd8"):
-        return "image/jpeg"
-    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
-        return "image/webp"
-    if head[4:12] == b"ftypavif":
-        return "image/avif"
-    return "image/ktx2" if head.startswith(b"\xabKTX 20") else "application/octet-stream"
+def _is_same(path: Path, file: Path) -> bool:
+    import filecmp
+
+    return path.is_file() and filecmp.cmp(path, file, shallow=False)
+
+
+def _blocks(file: Path) -> Iterator[Bytes]:
+    with file.open("rb") as opened:
+        while block := opened.read(atomic.BLOCK_BYTES):
+            yield np.frombuffer(block, np.uint8)
+
+
+def _data_uri(file: Path) -> str:
+    data = resolver.read_file(file).tobytes()
+    return uri.encode_data(data, media_type(data[:HEAD_BYTES]))

@@ -67,11 +67,11 @@ def open_file(path: str, opener: Opener = container.read) -> Source:
     for _ in range(MAX_OPEN_ATTEMPTS):
         before = _stamp(real)
         data, buffers = resolver.read_file(real, read=resolver.read_gltf), resolver.CompanionFiles(real.parent)
-        document = opener(data, buffers.open)
-        outside = [each.uri for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
-        for address in outside:
-            with suppress(FormatError):  # raised again when the bytes are read
-                buffers.open(uri.relative_path(address))
+        document = opener(data, buffers)
+        outside = [each for each in document.buffers if each.uri is not None and not uri.is_data(each.uri)]
+        for buffer in outside:
+            with suppress(FormatError):  # raised again when the bytes are used
+                _ = buffer.data
         if not outside or _stamp(real) == before:
             break
     return Source(document, path, len(data) + external_size(document), real.parent, data)
@@ -114,10 +114,10 @@ def write_file(
     by a link.
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
-    from anim.files import atomic
+    from anim.files import atomic, guard
     from anim.gltf.io import gltf_files, images
 
-    copies: dict[Path, Bytes] = {}
+    copies: dict[Path, Path] = {}
     if source is not None and source.folder is not None and not source.is_in_folder(path):
         document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
@@ -125,8 +125,10 @@ def write_file(
         images.write_copies(copies, within)
     if not path.lower().endswith(".gltf"):
         content = glb_chunks(document, unchanged)
-        if not dry_run:
-            atomic.write_file(Path(path), content)
+        if dry_run:
+            guard.plan(Path(path), in_place=True)
+        else:
+            atomic.write_file(Path(path), content, in_place=True)
         return sum(len(piece) for piece in content)
     same_folder = source is not None and source.is_in_folder(path)
     needed = [] if source is None or source.is_at(path) else list(external_files(source))

@@ -9,16 +9,19 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
+from typing import TypeAlias
 
 import numpy as np
 
 from anim.errors import AnimError
+from anim.files import resolver
 from anim.gltf.document import Bytes, Document, json_array
 from anim.gltf.io import container, uri
 
+Note: TypeAlias = Callable[[str], object]
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
 _HEAD_BYTES = 64  # bytes to detect a glTF
 _BLANK = b"\xef\xbb\xbf \t\r\n"
@@ -32,13 +35,21 @@ def external_buffers(path: Path) -> tuple[str, ...]:
         return ()
 
 
-def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared: Sequence[Path]) -> list[str]:
+@contextmanager
+def replace_text(path: Path, spared: Sequence[Path] = (), note: Note = lambda words: None) -> Iterator[None]:
+    """Remove the buffers of the .gltf at `path` that it doesn't use any more after the block, which replaces it."""
+    old = external_buffers(path)
+    yield
+    if old:
+        remove_unused(old, path, [resolver.read_file(path)], spared, note)
+
+
+def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared: Sequence[Path], note: Note) -> None:
     """Remove the buffers `old` that neither the .gltf at `path` nor any other known file uses.
 
-    text: of the .gltf, nothing if it was removed. spared: files that others need. Returns the names of unused files
-    that remain, since this program did not write them.
+    text: of the .gltf, nothing if it was removed. spared: files that others need. note: called with a line about each
+    unused file that remains, since this program did not write it.
     """
-    left = []
     named = _named(container.read(np.concatenate(text))) if text else ()
     needed = [*(path.parent / each for each in named), *spared]
     for name in sorted({*old} - {""}):
@@ -51,8 +62,7 @@ def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared:
             with suppress(OSError):
                 there.unlink()
         else:
-            left.append(name)
-    return left
+            note(f"'{name}' is not used by {path.name} any more; delete it if nothing else needs it")
 
 
 def _is_ours(buffer: Path, stem: str) -> bool:

@@ -12,7 +12,7 @@ from anim.arrays import Bytes
 from anim.errors import AnimError, FormatError
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.io.buffers import Resolve
-from anim.gltf.io.images import media_type
+from anim.gltf.io.images import HEAD_BYTES, media_type
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.materials import BASISU, WEBP, image_data
 from anim.show.page.packing import Packing
@@ -56,7 +56,7 @@ def embed_images(json: Json, document: Document, packing: Packing, resolve: Reso
 
 def _store(image: Json, data: Bytes, packing: Packing) -> None:
     """Replace an image's URI by a view, in place. Raises FormatError for a format that browsers do not draw."""
-    media = media_type(data)
+    media = media_type(data[:HEAD_BYTES].tobytes())
     if media not in DRAWN:
         raise FormatError("is KTX2" if media == "image/ktx2" else "is no PNG, JPEG, WebP or AVIF")
     if image.pop("uri", None) is not None:

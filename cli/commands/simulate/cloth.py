@@ -33,6 +33,7 @@ from cli.io import cache_files, documents, scenes
 from cli.options import caches, common, meshes, simulation
 from cli.options.simulation import parse_seconds, parse_vector
 from cli.progress import announce_compiling
+from cli.reports import image_notes
 from cli.text import Reporter
 from cli.workflows.bake_clip import Output, keeps_materials, onto_source
 from cli.workflows.colliders import parse_colliders
@@ -196,14 +197,11 @@ def command(
         )
     with commit_report_after(run.report, report, dry_run=dry_run):
         saved = cache_files.save(
-            cache,
-            output,
-            caches.write_options(ending, given | {"max_error": meters}),
-            ending=ending,
-            dry_run=dry_run,
-            inputs=lambda: [documents.input_files(source)],
+            cache, output, caches.write_options(ending, given | {"max_error": meters}), ending=ending, dry_run=dry_run
         )
     saved.report(reporter)
+    if ending == ".gltf" and not dry_run:
+        image_notes.report(document, source, output, reporter)
     name = "stdout" if output == documents.PIPE else output
     took = text.format_duration(time.perf_counter() - began)
     dry = " (dry run: nothing written)" if dry_run else ""

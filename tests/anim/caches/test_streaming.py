@@ -45,6 +45,7 @@ class Sink:
 
     def __init__(self, main: str) -> None:
         self.main = main
+        self.folder = None
         self.files: dict[str, Nowhere] = {}
 
     def create(self, name: str) -> BinaryIO:
