@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from anim.files import guard
-from anim.files.special_files import is_special
+from anim.files.special_files import descriptor_of, is_device_or_pipe
 from cli.errors import UsageError
 
 PIPE = "-"
@@ -110,7 +110,7 @@ def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
     values = [each for value in others for each in (value if isinstance(value, list | tuple) else [value])]
     inputs = {os.path.realpath(each) for each in values if isinstance(each, str) and "\0" not in each}
     for option, path in outputs.items():
-        if path in ("", PIPE) or "\0" in path or is_special(Path(path)):
+        if path in ("", PIPE) or "\0" in path or is_device_or_pipe(path) or descriptor_of(Path(path)) is not None:
             continue
         first = known.setdefault(os.path.realpath(path), option)
         if first != option or (option != "OUT" and os.path.realpath(path) in inputs):
