@@ -67,7 +67,8 @@ def warp(
     if not last > first:
         raise RangeError(f"the range from {first:g} s to {last:g} s is empty")
     if last - first > MAX_RANGE_S:
-        raise RangeError(f"the range from {first:g} s to {last:g} s is too long (limit {MAX_RANGE_S:g} s)")
+        kind = DataRangeError if clip.end - clip.start > MAX_RANGE_S else RangeError
+        raise kind(f"the range from {first:g} s to {last:g} s is too long (limit {MAX_RANGE_S:g} s)")
     new = []
     corners: dict[tuple[TimeAxis, tuple[CubicSegment, ...]], Floats] = {}  # equal for equal axes and maps
     for i, track in enumerate(clip.tracks):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from anim.gltf.writing import references
+from anim.gltf.writing import unknown_extensions
 from anim.measure.inspect import frame_rate, storage_cost
 from anim.show.plots import polylines, track_selection
 from anim.skinning import chunk_pipeline
@@ -164,7 +164,7 @@ def test_each_file_of_a_clip_is_made_from_a_document_without_the_others(
     def values(clips: int) -> int:
         (tmp_path / "in.glb").write_bytes(many.clips_different(clips))
         with monkeypatch.context() as patch:
-            counted = count_calls(patch, references, "_collect_unknown")
+            counted = count_calls(patch, unknown_extensions, "_collect_unknown")
             call("bake", tmp_path / "in.glb", tmp_path / "{clip}.glb", "--rigid").product()
         return len(counted)
 
