@@ -187,7 +187,8 @@ def _commit(staged: AtomicOutputs, path: str, ending: str, *, dry_run: bool) -> 
         return ()
     if staged.main not in staged.names:  # a file a frame: a rule of the name itself would always be out of date
         command_files.add_output(path, os.path.join(os.path.dirname(path), min(staged.names)))
-    with replace_text(target, command_files.inputs(), notes.append) if ending == ".gltf" else nullcontext():
+    spared = command_files.inputs_besides(target)
+    with replace_text(target, spared, notes.append) if ending == ".gltf" else nullcontext():
         staged.commit()
     return tuple(notes)
 

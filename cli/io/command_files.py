@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 from anim.files import guard
@@ -69,6 +69,11 @@ class CommandFiles:
                 raise _is_twice(path)
             self._new.add(place)
 
+    def inputs_besides(self, main: Path) -> list[Path]:
+        """Return the files that were added, without those that belong to `main` alone."""
+        owner = {os.path.realpath(main)}
+        return [Path(each.name) for each in self._read.values() if each.mains != owner]
+
     def begin(self) -> None:
         """Call what waits for the first change: its own files don't wait for it."""
         if (job := self.before_change) is not None:
@@ -88,10 +93,10 @@ def add_companions(main: Path, *paths: Path) -> None:
         files.add_inputs(main, paths)
 
 
-def inputs() -> list[Path]:
-    """Return the files that were read so far."""
+def inputs_besides(main: Path) -> list[Path]:
+    """Return the files that were read so far, without those that belong to `main` alone."""
     files = guard.current()
-    return list(map(Path, files.inputs)) if isinstance(files, CommandFiles) else []
+    return files.inputs_besides(main) if isinstance(files, CommandFiles) else []
 
 
 def add_output(path: str, written: str = "") -> None:
@@ -112,10 +117,13 @@ def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
     for option, path in outputs.items():
         if path in ("", PIPE) or "\0" in path or is_device_or_pipe(path) or descriptor_of(Path(path)) is not None:
             continue
-        first = known.setdefault(os.path.realpath(path), option)
-        if first != option or (option != "OUT" and os.path.realpath(path) in inputs):
+        real = os.path.realpath(path)
+        first = known.setdefault(real, option)
+        if first != option or (option != "OUT" and real in inputs):
             name = first if first != option else "an input"
             raise UsageError(f"{path}: {option} would replace {name} (expected another file)")
+        if real in inputs and PurePath(real).suffix.lower() != PurePath(path).suffix.lower():
+            raise UsageError(f"{path}: is a link to an input of another format (expected another file)")
 
 
 def _place(path: Path) -> str:

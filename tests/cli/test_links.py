@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 import fixtures
+from anim.gltf.io import images
+from tests.calls import count_calls
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal, shell
 
@@ -126,6 +128,29 @@ def test_links_of_the_system_are_written_into(tmp_path: Path) -> None:
     (tmp_path / "walk.glb").write_bytes(built("biped"))
     run = shell("gltf-anim convert - /dev/stdout < walk.glb | cat", tmp_path)
     assert run.product() == fixtures.build("biped")
+
+
+@pytest.mark.parametrize("line", ["bake {} l.npz", "convert {} l.gltf", "resample {} l.gltf --fps 4", "bake {} l.ply"])
+def test_an_input_is_not_replaced_by_another_format_through_a_link(
+    line: str, call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before, out = walk.read_bytes(), line.split()[2]
+    Path(out).symlink_to(walk)
+    assert "is a link to an input of another format" in refusal(call(*line.format(walk).split()), 2)
+    assert walk.read_bytes() == before
+    Path("l.glb").symlink_to(walk)
+    call("resample", walk, "l.glb", "--fps", "4").product()
+    assert walk.read_bytes() != before
+
+
+def test_no_image_is_copied_beside_a_device(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "skin.png").write_bytes(b"\x89PNG")
+    scene = tmp_path / "scene.gltf"
+    scene.write_text(json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "skin.png"}]}))
+    copied = count_calls(monkeypatch, images, "copy_images")
+    call("convert", scene, "/dev/null").product()
+    assert not copied
 
 
 @pytest.mark.parametrize("out", ["a.glb", "a.gltf", "a.npz"])

@@ -55,6 +55,42 @@ def test_a_buffer_of_another_name_stays_and_a_note_says_so_once(folder: Path, ca
     assert len(bins(folder)) == 2
 
 
+@pytest.mark.parametrize("above", [1, 2, 3])
+def test_a_buffer_that_a_file_far_above_uses_stays(above: int, folder: Path, call: Call) -> None:
+    place = folder.joinpath(*["deep"] * 3)
+    place.mkdir(parents=True)
+    for path in (folder / "walk.gltf", folder / "walk.bin"):
+        path.rename(place / path.name)
+    top = place.parents[above - 1]
+    named = json.dumps((place / "walk.bin").relative_to(top).as_posix())
+    user = top / "user.gltf"
+    user.write_text((place / "walk.gltf").read_text().replace('"walk.bin"', named))
+    assert replace(call, place) == ""
+    assert len(bins(place)) == 2
+    assert call("inspect", user).code == 0
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "bake walk.gltf walk.gltf --fps {fps}",
+        "convert-cache walk.gltf walk.gltf --fps {fps}",
+        "simulate cloth walk.gltf walk.gltf --fps {fps} --duration 0.3",
+    ],
+)
+def test_caches_made_in_place_leave_no_buffers(
+    line: str, folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each left one: those of the input were spared, though it was the output too."""
+    monkeypatch.chdir(folder)
+    Path("arm.glb").write_bytes(built("arm"))
+    call("bake", "arm.glb", "walk.gltf", "--clip", "bend", "--fps", "4").product()
+    for fps in (6, 8, 6):
+        call(*line.format(fps=fps).split()).product()
+        assert len(bins(folder)) == 1
+        assert call("inspect", "walk.gltf").code == 0
+
+
 def test_quiet_says_nothing_of_it(folder: Path, call: Call) -> None:
     rename_buffer(folder, "animation.bin")
     assert call("resample", folder / "walk.gltf", folder / "walk.gltf", "--fps", "9", "-q").err == ""

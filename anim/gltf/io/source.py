@@ -115,11 +115,13 @@ def write_file(
     note: called with a line about buffers of a replaced .gltf that are not removed. Raises OutputError.
     """
     from anim.files import atomic, guard
+    from anim.files.special_files import is_special
     from anim.gltf.io import gltf_files, images
 
     copies: dict[Path, Path] = {}
-    if source is not None and source.folder is not None and not source.is_in_folder(path):
-        document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(path)).parent)
+    folder = None if source is None or source.is_in_folder(path) or is_special(Path(path)) else source.folder
+    if folder is not None:
+        document, copies = images.copy_images(document, folder, resolver.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
     if not dry_run:
         images.write_copies(copies, within)

@@ -1,7 +1,8 @@
 """Remove buffers that a replaced or removed .gltf no longer uses, if this program wrote them.
 
 Their names derive from the .gltf (`walk.bin` of walk.gltf) or from their content (`walk-1a2b3c4d.bin`). They are
-removed unless another glTF in the folder or its parent, of any file name (walk.gltf.bak), or a link refers to them.
+removed unless another glTF in the folder or its parent, of any file name (walk.gltf.bak), one farther up, or a link
+refers to them.
 Other files remain.
 """
 
@@ -23,6 +24,7 @@ from anim.gltf.io import container, uri
 
 Note: TypeAlias = Callable[[str], object]
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
+NEAR_FOLDERS = 2  # a buffer's own and the one above: all files there are looked into, and unreadable ones need it
 _HEAD_BYTES = 64  # bytes to detect a glTF
 _BLANK = b"\xef\xbb\xbf \t\r\n"
 
@@ -80,33 +82,44 @@ def _is_ours(buffer: Path, stem: str) -> bool:
 
 
 def _is_used_elsewhere(buffer: Path, path: Path) -> bool:
-    """True if a glTF in the folder or its parent, an unreadable file there or a link uses the buffer."""
+    """True if a glTF in the folder or one above, an unreadable file in the nearest two or a link uses the buffer.
+
+    Files farther up count if they have an extension of glTF.
+    """
     folder = path.parent.resolve()
-    name = posixpath.normpath(buffer.relative_to(path.parent).as_posix())
-    for place, address in ((folder, name), (folder.parent, f"{folder.name}/{name}")):
+    name = buffer.relative_to(path.parent).as_posix()
+    for depth, place in enumerate((folder, *folder.parents)):
+        address = posixpath.normpath(posixpath.join(folder.relative_to(place).as_posix(), name))
         try:
             others = sorted(place.iterdir())
         except OSError:
-            return True
-        if any(other != folder / path.name and _needs(other, buffer, address) for other in others):
+            if depth < NEAR_FOLDERS:
+                return True
+            continue
+        near = others if depth < NEAR_FOLDERS else [each for each in others if _is_called_gltf(each)]
+        if any(other != folder / path.name and _needs(other, buffer, address, depth) for other in near):
             return True
     return False
 
 
-def _needs(other: Path, buffer: Path, address: str) -> bool:
-    """True if a file is a glTF or a link that refers to the buffer. address: from the file's folder."""
+def _needs(other: Path, buffer: Path, address: str, depth: int) -> bool:
+    """True if a file is a glTF or a link that refers to the buffer. address: from the file's folder, `depth` above."""
     try:
         if other.is_symlink() and other.name != buffer.name and other.samefile(buffer):
             return True
     except OSError:  # a broken link
         return False
-    is_called_so = any(suffix in other.name.lower() for suffix in container.SUFFIXES)
+    is_called_so = _is_called_gltf(other)
     try:
         if not other.is_file() or not (is_called_so or _begins_like_gltf(other)):
             return False
         return _may_name(_read_json(other), buffer.name) and address in _named(_opened(other))
     except (AnimError, OSError, RecursionError):
-        return is_called_so
+        return is_called_so and depth < NEAR_FOLDERS
+
+
+def _is_called_gltf(path: Path) -> bool:
+    return any(suffix in path.name.lower() for suffix in container.SUFFIXES)
 
 
 def _begins_like_gltf(path: Path) -> bool:
