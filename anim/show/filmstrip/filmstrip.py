@@ -8,8 +8,8 @@ from itertools import groupby
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats, Ints
-from anim.errors import RangeError
+from anim.arrays import AnyArray, Floats, Ints, is_finite
+from anim.errors import DataRangeError, RangeError
 from anim.memory import MemoryBudget
 from anim.show.filmstrip import captions, palette
 from anim.show.filmstrip.background import SceneView, mark_spacing, setup_view, translate_view
@@ -84,8 +84,8 @@ def filmstrip(rows: Sequence[Strip], extent: Extent, *, title: str = "", look: V
     """Return the picture (H, W, 3) of all rows, clip by clip; long rows are wrapped.
 
     Rows of one clip are wrapped together, so that methods can be compared at the same times.
-    Raises RangeError for frames of less than 32 or more than 4096 pixels, UnsupportedError for a picture beyond the
-    limit of memory.
+    Raises RangeError for frames of less than 32 or more than 4096 pixels and for infinite positions, UnsupportedError
+    for a picture beyond the limit of memory.
     """
     camera = _fit_camera(extent, look)
     width, height = camera.width, camera.height
@@ -246,6 +246,8 @@ def _fit_camera(extent: Extent, look: ViewOptions) -> Camera:
     if not 32 <= look.height <= 4096:
         raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
     points = extent.points.reshape(-1, 3)
+    if not is_finite(points):  # as float32 relative to a figure that the camera follows
+        raise DataRangeError("moves too far to be drawn (beyond float32)", help="--no-follow keeps the camera in place")
     return fit_camera(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
 
 
