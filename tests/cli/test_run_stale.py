@@ -50,6 +50,16 @@ def test_outputs_are_named_and_deleted_after_all_inputs_are_gone(made: Path, cal
     assert "note" not in call("run").err
 
 
+def test_a_mistyped_pattern_deletes_nothing(made: Path, call: Call) -> None:
+    settings = made / "gltf-anim.toml"
+    settings.write_text(settings.read_text().replace("*.glb", "*.gbl"))
+    before = outputs(made)
+    run = call("run", "--delete-stale")
+    assert run.code == 5
+    assert "not deleted, since their inputs are still there" in run.err
+    assert outputs(made) == before
+
+
 def test_only_unchanged_outputs_of_earlier_runs_are_deleted(made: Path, call: Call) -> None:
     (made / "build/crowd/cube.glb").write_bytes(b"other")
     (made / "build/notes.glb").write_bytes(b"mine")

@@ -33,9 +33,12 @@ def report_stale(
 ) -> None:
     """Name the stale outputs, or delete them, after a run of all files and recipes; save the record.
 
+    Without any job none is deleted whose input is still there: a pattern is likely to be mistyped.
     Raises OutputError, and UsageError for settings of budgets that are wrong.
     """
     stale = find_stale(record, book, jobs)
+    is_doubtful = delete and not jobs and any((record.folder / record.outputs[name][0]).exists() for name in stale)
+    delete = delete and not is_doubtful
     record.save({**record.unsaved, **written})
     if delete and stale:
         _delete(record.folder, stale, _files_read(book, jobs))
@@ -43,6 +46,7 @@ def report_stale(
     if stale:
         names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
         what = "deleted" if delete else "--delete-stale deletes them"
+        what = "not deleted, since their inputs are still there" if is_doubtful else what
         reporter.info(
             f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
         )
