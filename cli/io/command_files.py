@@ -122,7 +122,7 @@ def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
         if first != option or (option != "OUT" and real in inputs):
             name = first if first != option else "an input"
             raise UsageError(f"{path}: {option} would replace {name} (expected another file)")
-        if real in inputs and PurePath(real).suffix.lower() != PurePath(path).suffix.lower():
+        if path not in values and real in inputs and PurePath(real).suffix.lower() != PurePath(path).suffix.lower():
             raise UsageError(f"{path}: is a link to an input of another format (expected another file)")
 
 

@@ -32,7 +32,8 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
     outside = [image for image in json_array(document.json, "images") if external_uri(image)]
     lost = [image["uri"] for image in outside if locate_image(folder, image) is None]
     found = [image["uri"] for image in outside if find_image(folder, image) is not None]
-    others = [image["uri"] for image in outside if image["uri"] not in (*lost, *found)]
+    known = {*lost, *found}
+    others = [image["uri"] for image in outside if image["uri"] not in known]
     if found and copied:
         yield f"note: {plural(len(found), 'image')} copied beside the output ({_listed(found)})"
     elif found:
@@ -45,13 +46,14 @@ def notes(document: Document, folder: Path | None, *, copied: bool, embed_hint: 
             f"those of no image ({_listed(others)})"
         )
     away = [address for address in lost if folder is not None and _is_outside(address)]
+    far = {*away}
     if away:
         words = "refers" if len(away) == 1 else "refer"
         yield (
             f"note: {plural(len(away), 'image')} {words} out of the file's folder, never copied, and missing "
             f"unless the same address is right for the output ({_listed(away)})"
         )
-    if lost := [address for address in lost if address not in away]:
+    if lost := [address for address in lost if address not in far]:
         yield f"note: {plural(len(lost), 'image')} missing, since no such file can be read ({_listed(lost)})"
 
 

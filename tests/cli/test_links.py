@@ -144,6 +144,16 @@ def test_an_input_is_not_replaced_by_another_format_through_a_link(
     assert walk.read_bytes() != before
 
 
+def test_a_link_into_a_store_of_other_names_is_edited_in_place(
+    call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    walk.rename("ab12")
+    Path("f.glb").symlink_to("ab12")
+    call("resample", "f.glb", "f.glb", "--fps", "4").product()
+    assert Path("f.glb").is_symlink()
+
+
 def test_no_image_is_copied_beside_a_device(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "skin.png").write_bytes(b"\x89PNG")
     scene = tmp_path / "scene.gltf"

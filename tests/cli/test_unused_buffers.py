@@ -70,6 +70,25 @@ def test_a_buffer_that_a_file_far_above_uses_stays(above: int, folder: Path, cal
     assert call("inspect", user).code == 0
 
 
+def test_a_buffer_that_a_link_of_its_own_name_leads_to_stays(folder: Path, call: Call) -> None:
+    user = folder.parent / "user.gltf"
+    user.write_text((folder / "walk.gltf").read_text())
+    (folder.parent / "walk.bin").symlink_to("folder/walk.bin")
+    assert replace(call, folder) == ""
+    assert (folder / "walk.bin").is_file()
+
+
+@pytest.mark.parametrize("content", [b"{", b'{"buffers": [3, {"uri": 4}], "images": 5}', b"glTF\x02\0\0\0", b"[]"])
+def test_invalid_files_far_above_need_no_buffer(content: bytes, folder: Path, call: Call) -> None:
+    place = folder / "deep/deep"
+    place.mkdir(parents=True)
+    for path in (folder / "walk.gltf", folder / "walk.bin"):
+        path.rename(place / path.name)
+    (folder.parent / "odd.glb").write_bytes(content + b"walk.bin")
+    assert replace(call, place) == ""
+    assert len(bins(place)) == 1
+
+
 @pytest.mark.parametrize(
     "line",
     [

@@ -70,7 +70,17 @@ def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> Non
             path.parent.mkdir(parents=True, exist_ok=True)
             if not path.exists():
                 with atomic.temporary_files() as made:
-                    atomic.move_to_free(atomic.write_temporary(path, _blocks(file), made), path)
+                    temporary = atomic.write_temporary(path, _blocks(file), made)
+                    _place(temporary, path, file)
+
+
+def _place(temporary: Path, path: Path, file: Path) -> None:
+    """Give a copy its name; another process, as of the same run, may have made the same copy meanwhile."""
+    try:
+        atomic.move_to_free(temporary, path)
+    except FileExistsError:
+        if not _is_same(path, file):
+            raise
 
 
 def _check_place(path: Path, folder: Path) -> None:

@@ -19,8 +19,8 @@ import numpy as np
 
 from anim.errors import AnimError
 from anim.files import resolver
-from anim.gltf.document import Bytes, Document, json_array
-from anim.gltf.io import container, uri
+from anim.gltf.document import Bytes, Document, Json
+from anim.gltf.io import container, json_text, uri
 
 Note: TypeAlias = Callable[[str], object]
 DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
@@ -52,7 +52,7 @@ def remove_unused(old: Sequence[str], path: Path, text: Sequence[Bytes], spared:
     text: of the .gltf, nothing if it was removed. spared: files that others need. note: called with a line about each
     unused file that remains, since this program did not write it.
     """
-    named = _named(container.read(np.concatenate(text))) if text else ()
+    named = _named(container.read(np.concatenate(text)).json) if text else ()
     needed = [*(path.parent / each for each in named), *spared]
     for name in sorted({*old} - {""}):
         there = path.parent / name
@@ -88,6 +88,7 @@ def _is_used_elsewhere(buffer: Path, path: Path) -> bool:
     """
     folder = path.parent.resolve()
     name = buffer.relative_to(path.parent).as_posix()
+    buffer = folder / name
     for depth, place in enumerate((folder, *folder.parents)):
         address = posixpath.normpath(posixpath.join(folder.relative_to(place).as_posix(), name))
         try:
@@ -105,7 +106,7 @@ def _is_used_elsewhere(buffer: Path, path: Path) -> bool:
 def _needs(other: Path, buffer: Path, address: str, depth: int) -> bool:
     """True if a file is a glTF or a link that refers to the buffer. address: from the file's folder, `depth` above."""
     try:
-        if other.is_symlink() and other.name != buffer.name and other.samefile(buffer):
+        if other.is_symlink() and other != buffer and other.samefile(buffer):
             return True
     except OSError:  # a broken link
         return False
@@ -113,7 +114,8 @@ def _needs(other: Path, buffer: Path, address: str, depth: int) -> bool:
     try:
         if not other.is_file() or not (is_called_so or _begins_like_gltf(other)):
             return False
-        return _may_name(_read_json(other), buffer.name) and address in _named(_opened(other))
+        content = _read_json(other)
+        return _may_name(content, buffer.name) and address in _named(json_text.parse(content))
     except (AnimError, OSError, RecursionError):
         return is_called_so and depth < NEAR_FOLDERS
 
@@ -134,12 +136,11 @@ def _may_name(json: bytes, name: str) -> bool:
     return not is_plain or name.encode() in json
 
 
-def _named(document: Document) -> set[str]:
-    """Names of all files that a document refers to."""
-    addresses = [buffer.uri for buffer in document.buffers] + [
-        i.get("uri") for i in json_array(document.json, "images")
-    ]
-    return {_file_of(address) for address in addresses} - {""}
+def _named(json: Json) -> set[str]:
+    """Names of all files that JSON of glTF, which may be invalid, refers to."""
+    lists = [found for key in ("buffers", "images") if isinstance(found := json.get(key), list)]
+    addresses = [each.get("uri") for found in lists for each in found if isinstance(each, dict)]
+    return {_file_of(address) for address in addresses if isinstance(address, str)} - {""}
 
 
 def _file_of(address: str | None) -> str:
@@ -159,4 +160,4 @@ def _read_json(path: Path) -> bytes:
     with path.open("rb") as file:
         head = file.read(20)
         is_glb = head.startswith(container.MAGIC)
-        return head + file.read(int.from_bytes(head[12:16], "little") if is_glb else -1)
+        return file.read(int.from_bytes(head[12:16], "little")) if is_glb else head + file.read()

@@ -25,6 +25,7 @@ NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
 FORMAT = 1
 HASH = re.compile("[0-9a-f]{64}")
 MAX_HASHED_BYTES = 1 << 32  # longest GLB; a hole in a file may be longer than can be read
+KEEPING_FILES = frozenset({".gitignore", ".gitkeep"})  # by which git keeps a folder that is new otherwise
 TAG_NAME = "CACHEDIR.TAG"
 TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# results of `gltf-anim run`: may be deleted\n"
 
@@ -148,7 +149,7 @@ def check_named(folder: Path) -> None:
         names = os.listdir(folder)
     except OSError:  # none yet, or what an error is raised for when it is written
         return
-    is_cache = all(name.startswith(".") for name in names)
+    is_cache = KEEPING_FILES.issuperset(names)
     with suppress(OSError):
         is_cache = is_cache or b"gltf-anim run" in own_files.read(folder / TAG_NAME)
     if not is_cache:

@@ -41,7 +41,7 @@ def open_for_lines(path: Path, *, append: bool) -> io.FileIO:
     not be the cache's own, as a file with a second name, is never written into: the new one takes its place.
     """
     check_links(path.parent, path)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_LINK | special_files.NO_WAIT | getattr(os, "O_CLOEXEC", 0)
+    flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK | special_files.NO_WAIT | getattr(os, "O_CLOEXEC", 0)
     with atomic.name_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with lock_folder(path.parent):
