@@ -247,7 +247,7 @@ def _fit_camera(extent: Extent, look: ViewOptions) -> Camera:
         raise RangeError(f"frames are {look.height} pixels high (expected 32 … 4096)")
     points = extent.points.reshape(-1, 3)
     if not is_finite(points):  # as float32 relative to a figure that the camera follows
-        raise DataRangeError("moves too far to be drawn (beyond float32)", help="--no-follow keeps the camera in place")
+        raise DataRangeError("moves too far for a camera that follows it (beyond float32)")
     return fit_camera(points, height=look.height, azimuth=look.azimuth, elevation=look.elevation)
 
 
