@@ -114,7 +114,7 @@ class Command(Parsing, TyperCommand):
             return depfile_output.invoke(lambda: run(ctx), path, output, files, dry_run=dry_run)
 
     def _output_names(self, ctx: Any) -> tuple[dict[str, str], list[Any]]:
-        """Return the names of outputs by option, "OUT" first, and the values of all other parameters."""
+        """Return the names of outputs by option, "OUT" first, and the values of parameters that name other files."""
         outputs, others = dict[str, str](), list[Any]()
         for each in self.params:
             value = ctx.params.get(each.name)
@@ -124,7 +124,7 @@ class Command(Parsing, TyperCommand):
                 outputs = {OUT: value or "", **outputs}
             elif each.name in OTHER_OUTPUTS:
                 outputs[each.opts[0]] = value or ""
-            else:
+            elif each.param_type_name == "argument" or "FILE" in (each.metavar or ""):
                 others.append(value)
         return outputs and {**outputs, "--depfile": ctx.meta.get(DEPFILE) or ""}, others
 

@@ -108,8 +108,8 @@ def add_output(path: str, written: str = "") -> None:
 def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
     """Raise UsageError, before any work, if two outputs have one name, or one has that of an input.
 
-    outputs: their names, by the option, "OUT" first; it can be an input. others: values of all other options and
-    arguments, texts or lists of them, which may name files.
+    outputs: their names, by the option, "OUT" first; it can be an input. others: values of the arguments and options
+    that name other files, texts or lists of them.
     """
     known: dict[str, str] = {}
     values = [each for value in others for each in (value if isinstance(value, list | tuple) else [value])]

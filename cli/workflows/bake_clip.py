@@ -16,7 +16,7 @@ from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_t
 from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import RangeError
-from anim.files import resolver
+from anim.files import guard, resolver
 from anim.gltf.document import Document
 from anim.gltf.io import images
 from anim.gltf.io.source import Source
@@ -146,6 +146,8 @@ def prepare_source(document: Document, source: Source, meshes: set[int], output:
     if source.folder is None or source.is_in_folder(output.path):
         return document
     document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(output.path)).parent)
+    guard.plan(Path(output.path), in_place=True)  # before an image is copied
+    guard.plan_new(copies)
     if not output.dry_run:
         images.write_copies(copies)
     return document

@@ -118,3 +118,17 @@ def test_caches_are_replaced_with_their_companions(files: Path, call: Call) -> N
     for name in ("x.png", "x.pc2", "x.ply"):
         call("bake", "a.glb", name, *FPS.split()).product()
         call("convert-cache", name, name, "--up", "z").product()
+
+
+def test_a_name_of_a_clip_is_no_file(files: Path, call: Call) -> None:
+    """Any value of an option counted as a file that is read."""
+    call("optimize", "a.glb", "out.glb", "--clip", "bend", "--report", "bend").product()
+    assert Path("bend").is_file()
+
+
+@pytest.mark.parametrize("line", ["resample a.gltf out/b.glb --fps 9", "convert a.gltf out/b.gltf"])
+def test_no_image_is_copied_if_an_output_is_refused(line: str, files: Path, call: Call) -> None:
+    Path("out").mkdir()
+    assert call(*line.split(), "--depfile", "out/skin.png").code == 2
+    assert not list(Path("out").iterdir())
+    assert call(*line.split(), "--depfile", "out/skin.png", "--dry-run").code == 2

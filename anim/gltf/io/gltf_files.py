@@ -9,16 +9,18 @@ Buffers that the replaced .gltf no longer uses are removed last, if this program
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from pathlib import Path, PurePath
+from functools import partial
+from pathlib import Path
 
 from anim.errors import OutputError
 from anim.files import atomic, guard, resolver, signals, special_files
 from anim.files.folder_lock import lock_folder
 from anim.gltf.document import Bytes, Document
 from anim.gltf.io import container, unused_buffers
+from anim.gltf.io.content_names import content_names
 from anim.gltf.io.unused_buffers import Note
 
 
@@ -97,7 +99,7 @@ class BufferNames:
         before = self.old[number : number + 1]
         if before and before[0] and self._holds(before[0], data):
             return before[0]
-        for name in _candidates(preferred, data):
+        for name in content_names(preferred, partial(_digest, data)):
             if not os.path.lexists(self.folder / name) or self._holds(name, data):
                 return name
         raise OutputError(f"{self.folder / preferred}: is there already, with other content")
@@ -110,13 +112,10 @@ class BufferNames:
         return is_equal
 
 
-def _candidates(preferred: str, data: Bytes) -> Iterator[str]:
+def _digest(data: Bytes) -> str:
     import hashlib
 
-    yield preferred
-    digest = hashlib.sha256(data.data).hexdigest()
-    name = PurePath(preferred)
-    yield from (f"{name.stem}-{digest[:length]}{name.suffix}" for length in unused_buffers.DIGEST_LENGTHS)
+    return hashlib.sha256(data.data).hexdigest()
 
 
 def _commit(path: Path, text: list[Bytes], new: Mapping[Path, list[Bytes]]) -> None:

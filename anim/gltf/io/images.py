@@ -10,7 +10,8 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from anim.files import atomic, guard, resolver
 from anim.files.special_files import open_regular
 from anim.gltf.document import Bytes, Document, Json, json_array
 from anim.gltf.io import uri
+from anim.gltf.io.content_names import content_names
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".gif", ".bmp", ".ktx2", ".dds")
 # By place in the file; the first two are glTF's own, the others those of its extensions, and what loaders show too
@@ -63,7 +65,6 @@ def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> Non
         for path in copies:
             _check_place(path, within)
     if copies:
-        guard.plan_new(copies)
         guard.begin()
     for path, file in copies.items():
         with atomic.name_errors(path):
@@ -140,20 +141,17 @@ def _is_image_name(path: str) -> bool:
 
 def _free(target: Path, name: str, file: Path, copies: Mapping[Path, Path]) -> str:
     """The free name for a copy in the folder."""
-    for each in _candidates(name, file):
+    for each in content_names(name, partial(_digest, file)):
         if target / each in copies or not os.path.lexists(target / each) or _is_same(target / each, file):
             return each
     raise OutputError(f"{target / name}: is there already, with other content")
 
 
-def _candidates(name: str, file: Path) -> Iterator[str]:
+def _digest(file: Path) -> str:
     import hashlib
 
-    yield name
     with file.open("rb") as opened:
-        digest = hashlib.file_digest(opened, "sha256").hexdigest()
-    path = PurePosixPath(name)
-    yield from (str(path.with_name(f"{path.stem}-{digest[:n]}{path.suffix}")) for n in (8, 16, 64))
+        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def _is_same(path: Path, file: Path) -> bool:

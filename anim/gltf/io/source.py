@@ -123,13 +123,13 @@ def write_file(
     if folder is not None:
         document, copies = images.copy_images(document, folder, resolver.resolve_links(Path(path)).parent)
         unchanged = None if copies else unchanged  # copies may have got other names
+    guard.plan(Path(path), in_place=True)  # before an image is copied
+    guard.plan_new(copies)
     if not dry_run:
         images.write_copies(copies, within)
     if not path.lower().endswith(".gltf"):
         content = glb_chunks(document, unchanged)
-        if dry_run:
-            guard.plan(Path(path), in_place=True)
-        else:
+        if not dry_run:
             atomic.write_file(Path(path), content, in_place=True)
         return sum(len(piece) for piece in content)
     same_folder = source is not None and source.is_in_folder(path)

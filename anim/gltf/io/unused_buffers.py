@@ -21,9 +21,9 @@ from anim.errors import AnimError
 from anim.files import resolver
 from anim.gltf.document import Bytes, Document, Json
 from anim.gltf.io import container, json_text, uri
+from anim.gltf.io.content_names import DIGEST_LENGTHS
 
 Note: TypeAlias = Callable[[str], object]
-DIGEST_LENGTHS = (8, 16, 64)  # hex digits of SHA-256 in a name; shorter ones may be in use by other files
 NEAR_FOLDERS = 2  # a buffer's own and the one above: all files there are looked into, and unreadable ones need it
 _HEAD_BYTES = 64  # bytes to detect a glTF
 _BLANK = b"\xef\xbb\xbf \t\r\n"
