@@ -9,7 +9,8 @@ from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from anim.measure.continuous_bound.prover import Prover
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.surface import diagonal
 from anim.measure.error.whole_scene import WholeScene
 from anim.model import Clip, Scene

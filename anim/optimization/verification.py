@@ -12,7 +12,8 @@ from anim.arrays import Floats, unique_sorted
 from anim.measure.compare.equal_scenes import are_equal_motions, no_error
 from anim.measure.continuous_bound.prover import BOUND_SLACK, Proof, Prover
 from anim.measure.continuous_bound.sampled_clips import SampledClip
-from anim.measure.error.metric import NOISE, ErrorMetric, MotionError
+from anim.measure.error.metric import NOISE, ErrorMetric
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.sample_times import SAME_MOMENT, cut_times, dense_times, key_and_mid_times
 from anim.measure.error.statistics import Statistics, statistics
 from anim.model import Clip, Interpolation

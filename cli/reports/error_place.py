@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from anim.measure.error.metric import MotionError
+from anim.measure.error.motion_error import MotionError
 
 
 def describe_place(error: MotionError) -> str:

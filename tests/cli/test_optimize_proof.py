@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anim.measure.error.metric import MotionError
+from anim.measure.error.motion_error import MotionError
 from anim.optimization.options import Bounds, Policy, Reference, Request
 from anim.optimization.verification import Verification
 from cli.reports import optimize_bound

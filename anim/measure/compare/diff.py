@@ -16,7 +16,8 @@ from anim.measure.compare.correspondence import Correspondence
 from anim.measure.compare.equal_scenes import are_equal, no_error
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.equal_clips import first_equal
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.sample_times import FPS, dense_times
 from anim.measure.error.statistics import Peak, Statistics, statistics
 from anim.model import Clip, Scene, Track

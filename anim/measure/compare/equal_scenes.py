@@ -6,7 +6,8 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.measure.compare.correspondence import Correspondence
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.point_groups import Binding
 from anim.measure.error.surface import Surface
 from anim.model import Clip, Scene, Skeleton

@@ -20,7 +20,8 @@ from anim.measure.continuous_bound.intervals import MAX_UNSPLIT_S
 from anim.measure.continuous_bound.refinement import RefinedMaximum, refine
 from anim.measure.continuous_bound.sampled_clips import ClipPart, SampledClip, divide, end_limits
 from anim.measure.continuous_bound.subintervals import OpenIntervals, TimeIntervals, join_intervals
-from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples, MotionError
+from anim.measure.error.metric import NOISE, ErrorMetric, ErrorSamples
+from anim.measure.error.motion_error import MotionError
 from anim.model import Clip, Scene
 from anim.sampling.players import PLAYERS
 

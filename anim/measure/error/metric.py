@@ -19,6 +19,7 @@ from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.max_displacement import max_displacement
 from anim.measure.error.merged_groups import merge_points, merge_surfaces
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
 from anim.measure.error.pointer_error import pointer_error
 from anim.measure.error.posed_clips import AskedTimes, RecentSamplers, Samplers, pose_clips
@@ -37,27 +38,6 @@ NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no 
 SLACK = 1.001  # factor: a bound this close to a found error is not refined
 MAX_SEARCHED = 40_000_000  # vertices per surface and block; if there are more, the bound of the rest is reported
 BLOCK = 40_000  # matrices of nodes per block, each about 600 bytes with derived values
-
-
-class MotionError(NamedTuple):
-    """The largest distance between two versions of a clip.
-
-    max_error: m, upper bound at the sampled times. time: s. place: the mesh or node. joint: the joint with the largest
-    contribution. times: number of samples.
-    max_pointer_error: largest error of a track that moves no node, as a fraction of its range.
-    vertex: its index in the mesh, −1 for a shell or if the error is too small to be searched.
-    is_around_node: whether it is that of a shell beside vertices; then `place` is the node, which moves none.
-    """
-
-    max_error: float
-    time: float
-    place: str
-    joint: str
-    times: int
-    max_pointer_error: float = 0.0
-    pointer: str = ""
-    vertex: int = -1
-    is_around_node: bool = False
 
 
 class Block(NamedTuple):

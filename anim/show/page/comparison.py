@@ -13,7 +13,8 @@ from anim.gltf.reading.reader import clip_name
 from anim.measure.compare.name_matching import match_by_name_then_order
 from anim.measure.compare.vertex_distance import VertexDistance
 from anim.measure.error.error_curve import ErrorCurve, error_curve
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.surface import has_vertices
 from anim.model import Clip
 from anim.show.page.page import ClipError, PageContent, PageLink, PagePanel, PageRow

@@ -9,7 +9,8 @@ import pytest
 
 from anim.arrays import Floats
 from anim.gltf.reading import reader
-from anim.measure.error.metric import ErrorMetric, MotionError
+from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.motion_error import MotionError
 from anim.measure.error.posed_clips import AskedTimes
 from anim.measure.error.sample_times import key_and_mid_times
 from anim.model import Scene
