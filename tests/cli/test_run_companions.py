@@ -134,3 +134,26 @@ def test_inputs_of_the_same_content_have_buffers_of_their_own(
     shutil.rmtree(text_file / "build")
     assert "2 files: 2 cached" in call("run").err
     assert [(text_file / name).read_bytes() for name in made] == expected
+
+
+@pytest.mark.parametrize("is_link", [False, True])
+def test_a_buffer_of_the_input_at_the_place_of_the_output_is_not_replaced(
+    is_link: bool, text_file: Path, call: Call
+) -> None:
+    """The input was lost."""
+    (text_file / "gltf-anim.toml").unlink()
+    write_recipe(text_file, "resample --fps 12", match="crowd/*.gltf", out="{folder}/{stem}.glb")
+    buffer = text_file / f"crowd/arm.{'bin' if is_link else 'glb'}"
+    if is_link:
+        call("run").product()  # now from the cache
+        (text_file / "crowd/arm.glb").unlink()
+        (text_file / "crowd/arm.glb").symlink_to("arm.bin")
+    else:
+        (text_file / "crowd/arm.bin").rename(buffer)
+        path = text_file / "crowd/arm.gltf"
+        path.write_text(path.read_text().replace("arm.bin", "arm.glb"))
+    before = buffer.read_bytes()
+    run = call("run")
+    assert run.code == 3
+    assert "'crowd/arm.glb', the output of 'crowd/arm.gltf', is a file that its own steps read" in run.err
+    assert buffer.read_bytes() == before

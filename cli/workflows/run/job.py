@@ -169,7 +169,7 @@ def write_output(
 
 
 def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
-    check_output(job)
+    check_output(job, spared)
     path = job.folder / job.output
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
