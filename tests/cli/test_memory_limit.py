@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -143,6 +144,20 @@ def test_vertices_of_all_instances_count(line: str, skinned: bool, call: Call, t
     said = refusal(call(*(names.get(word, word) for word in line.split())), 4)
     assert "would take 24 GB or more (limit 1 GB)" in said
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_morph_targets_of_all_instances_count(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "in.gltf"
+    content = json.loads(targets(200, 3))
+    content["nodes"] = [{"mesh": 0}] * 700
+    content["scenes"] = [{"nodes": list(range(700))}]
+    path.write_bytes(text(content))
+    said = refusal(call("bake", path, tmp_path / "out.npz", "--rigid"), 4)
+    assert "140000 morph targets of all instances of meshes would take 1.12 GB or more" in said
+    content["nodes"] = [{"mesh": 0}] * 600
+    content["scenes"] = [{"nodes": list(range(600))}]
+    path.write_bytes(text(content))
+    call("bake", path, tmp_path / "out.npz", "--rigid").product()
 
 
 def test_what_measures_at_nodes_then_says_so(call: Call, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from anim.errors import AnimError, FormatError, ShapeError, UnsupportedError
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.meshes import BYTES_PER_POSED_VERTEX, Meshes
+from anim.gltf.reading.meshes import BYTES_PER_MORPH, BYTES_PER_POSED_VERTEX, Meshes
 from anim.gltf.reading.repeated_keys import BYTES_PER_INSPECTED_KEY, check_repeated_keys
 from anim.gltf.reading.scene_nodes import check_not_required, depth_first
 from anim.gltf.validation import hierarchy
@@ -131,6 +131,8 @@ def scene(
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
     accessors.budget.check(BYTES_PER_POSED_VERTEX * sum(len(each.mesh.positions) for each in instances))
+    num_morphs = sum(len(each.mesh.targets) for each in instances)
+    accessors.budget.check(BYTES_PER_MORPH * num_morphs, f"{num_morphs} morph targets of all instances of meshes")
     return Scene(_skeleton(document, parents) if skeleton is None else skeleton, tuple(instances))
 
 
