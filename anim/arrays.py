@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Hashable, Iterable
 from dataclasses import fields
 from typing import Any, TypeAlias, TypeVar
@@ -25,6 +26,26 @@ MIN_SUMMED = 1 << 13  # numbers; the sum of fewer squares is no faster than a lo
 _FLOAT64 = np.dtype(np.float64)
 _NO_NUMBERS = {"U": "text", "S": "bytes", "M": "dates", "m": "differences of dates", "V": "records"}  # kinds of arrays
 _specs: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {}  # axes, and which of them have a fixed length
+
+
+class Identity:
+    """Objects as a key of dictionaries: equal to the same objects only, which it keeps alive.
+
+    For arrays that tracks share, which have no hash of their values. Identity(a) == Identity(a.copy()) → False
+    """
+
+    __slots__ = ("_objects",)
+
+    def __init__(self, *objects: object) -> None:
+        self._objects = objects
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Identity) or len(self._objects) != len(other._objects):
+            return False
+        return all(map(operator.is_, self._objects, other._objects))
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(object.__hash__, self._objects)))
 
 
 def as_floats(values: ArrayLike, shape: str, *, name: str = "array") -> Floats:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Bools, Floats, Identity, Ints
 from anim.model import Track
 
 MAX_BLOCK_KEYS = 1 << 17  # of the tracks of a table, unless one has more: temporary arrays stay small
@@ -89,7 +89,7 @@ def track_tables(found: Sequence[tuple[int, Track]], path: str) -> Iterator[Trac
     path: not "weights", whose width differs.
     """
     block: list[tuple[int, Track]] = []
-    seen: set[tuple[int, int]] = set()
+    seen: set[Identity] = set()
     size = 0
     for each in found:
         keys = _identity(each[1])
@@ -106,7 +106,7 @@ def track_tables(found: Sequence[tuple[int, Track]], path: str) -> Iterator[Trac
 
 def track_table(found: Sequence[tuple[int, Track]], path: str) -> TrackTable:
     """Return one table of all tracks, otherwise as `track_tables`."""
-    runs: dict[tuple[int, int], int] = {}
+    runs: dict[Identity, int] = {}
     chosen: list[Track] = []
     numbers = []
     for _, track in found:
@@ -126,6 +126,6 @@ def track_table(found: Sequence[tuple[int, Track]], path: str) -> TrackTable:
     )
 
 
-def _identity(track: Track) -> tuple[int, int]:
+def _identity(track: Track) -> Identity:
     """The same for tracks that share their keys, as those of one pair of accessors do."""
-    return id(track.values), id(track.times)
+    return Identity(track.values, track.times)

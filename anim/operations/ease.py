@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anim.arguments import positive
-from anim.arrays import Bools, Floats
+from anim.arrays import Bools, Floats, Identity
 from anim.curves.easing import table
 from anim.curves.easing.function import Easing
 from anim.curves.fitting.adaptive_keys import TrackFunction, cubic_keys, float32_tolerance, linear_keys
@@ -93,7 +93,7 @@ def _compared(track: Track) -> tuple[object, ...]:
     """All that easing depends on."""
     parts = (track.values, track.in_tangents, track.out_tangents)
     if track.values.nbytes > MAX_COMPARED_BYTES:
-        return track.time_axis, track.interpolation, track.kind, *map(id, parts)
+        return track.time_axis, track.interpolation, track.kind, Identity(*parts)
     keys = (None if part is None else part.tobytes() for part in parts)
     return track.time_axis, track.interpolation, track.kind, track.values.shape, *keys
 

@@ -113,3 +113,11 @@ def test_what_is_read_only_already_is_shared() -> None:
 def test_indices_are_grouped_in_the_order_of_first_keys() -> None:
     assert list(arrays.group_indices("bcab").items()) == [("b", [0, 3]), ("c", [1]), ("a", [2])]
     assert arrays.group_indices([]) == {}
+
+
+def test_objects_as_keys_are_equal_to_themselves_only() -> None:
+    a, b = np.zeros(2), np.zeros(2)
+    found = {arrays.Identity(a, None): "a", arrays.Identity(b, None): "b", arrays.Identity(a): "one"}
+    assert [found[arrays.Identity(*each)] for each in ((a, None), (b, None), (a,))] == ["a", "b", "one"]
+    assert arrays.Identity(a) != arrays.Identity(a.copy())
+    assert arrays.Identity(a) != a.tolist()

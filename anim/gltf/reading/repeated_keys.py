@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from anim.arrays import Identity
 from anim.memory import MemoryBudget
 from anim.model import Clip, Track
 
@@ -23,11 +24,12 @@ def check_repeated_keys(clips: Iterable[Clip], budget: MemoryBudget, bytes_per_k
 
 def count_repeated_keys(clips: Iterable[Clip]) -> int:
     """Return the number of keys of moving tracks that share their values with another, except those of the first."""
-    uses: dict[int, tuple[Track, int]] = {}
-    for tracks in {tuple(map(id, clip.tracks)): clip.tracks for clip in clips}.values():
+    uses: dict[Identity, tuple[Track, int]] = {}
+    for tracks in {Identity(*clip.tracks): clip.tracks for clip in clips}.values():
         for track in tracks:
-            first, count = uses.get(id(track.values), (track, 0))
-            uses[id(track.values)] = first, count + 1
+            shared = Identity(track.values)
+            first, count = uses.get(shared, (track, 0))
+            uses[shared] = first, count + 1
     return sum((count - 1) * len(track.times) for track, count in uses.values() if count > 1 and _moves(track))
 
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from anim.arrays import Identity
 from anim.errors import AnimError, NotFoundError, RangeError, ShapeError, check_type
 from anim.gltf.document import Document, Json, copy_json, json_array
 from anim.gltf.meshopt.storage import EncodedTrack, check_extension
@@ -99,7 +100,7 @@ class _ContentPool:
         self._indices: dict[AccessorData, int] = {}
         self._time_axes: dict[TimeAxis, int] = {}
         self._values: dict[tuple[object, ...], int] = {}
-        self._digests: dict[tuple[int, ...], tuple[Track, bytes]] = {}  # by identity of arrays, which the tracks keep
+        self._digests: dict[Identity, bytes] = {}  # by values and tangents
 
     def _add(self, content: AccessorData) -> int:
         index = self._indices.get(content)
@@ -121,10 +122,10 @@ class _ContentPool:
 
     def _digest(self, track: Track) -> bytes:
         """Digest of a track's values; those that many tracks share are read once."""
-        arrays = id(track.values), id(track.in_tangents), id(track.out_tangents)
-        if arrays not in self._digests:
-            self._digests[arrays] = track, _value_digest(track)
-        return self._digests[arrays][1]
+        shared = Identity(track.values, track.in_tangents, track.out_tangents)
+        if shared not in self._digests:
+            self._digests[shared] = _value_digest(track)
+        return self._digests[shared]
 
     def time_axis(self, track: Track) -> int:
         """The pending index of a track's times; those of a shared axis are encoded once."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anim.arrays import Bools, Floats
+from anim.arrays import Bools, Floats, Identity
 from anim.maths import quaternion
 from anim.model import Interpolation, Track, ValueKind
 from anim.sampling.batch import ConcatenatedTracks, concatenate
@@ -30,7 +30,7 @@ def are_moving(tracks: Sequence[Track]) -> Bools:
 
 def _shared_keys(track: Track) -> object:
     """The same for tracks that differ in no more than their node: `are_moving` is then the same."""
-    return track.kind, track.interpolation, *map(id, (track.values, track.in_tangents, track.out_tangents))
+    return track.kind, track.interpolation, Identity(track.values, track.in_tangents, track.out_tangents)
 
 
 def _is_moving(group: ConcatenatedTracks) -> Bools:
