@@ -201,9 +201,9 @@ def _compare_pairs(
             placed = (prover, before, after) if part is None else (Prover(part[0]), *part[1:])
             measured = _measure(*placed, times, player=player, fps=fps)
         ends = old[i].end, new[j].end
-        lost = _lost(prover.ruler, old[i], new[j])
+        missing, added = _lost(prover.ruler, old[i], new[j])
         unmeasured = no_old_value + no_new_value
-        found.append(ClipDiff(i, j, before.name, after.name, *measured, *ends, *lost, unmeasured))
+        found.append(ClipDiff(i, j, before.name, after.name, *measured, *ends, missing, added, unmeasured))
     return found
 
 
@@ -229,7 +229,9 @@ def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player
     return _Measured(error, bound, found.capped(error.max_error))
 
 
-def _lost(ruler: ErrorMetric, before: Clip, after: Clip) -> tuple[tuple[tuple[str, str], ...], ...]:
+def _lost(
+    ruler: ErrorMetric, before: Clip, after: Clip
+) -> tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]:
     """Targets of tracks of only the old clip, and of only the new one."""
     nodes = ruler.pairs.nodes
     one = {_target(track, int(nodes[track.node]) if track.node is not None else -1): track for track in before.tracks}
