@@ -88,7 +88,8 @@ PUBLIC = {
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader scene_nodes vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets extensions hierarchy rules schema",
-    "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
+    "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal unknown_extensions "
+    "writer",
     "measure.compare": "diff equal_scenes name_matching vertex_distance",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "clip_groups largest_error prover sampled_clips",

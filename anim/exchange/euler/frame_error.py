@@ -36,7 +36,7 @@ def translation_error(clip: Clip, times: Floats, lengths: Floats) -> tuple[float
     translations = [track for track in clip.tracks if track.path == "translation"]
 
     def in_meters(vectors: Floats, tracks: Batch) -> Floats:
-        nodes = [track.node for track in tracks.tracks]
+        nodes = [track.node or 0 for track in tracks.tracks]
         return np.asarray(np.linalg.norm(vectors, axis=-1) * lengths[nodes])
 
     def lerp(tracks: Batch, times: Floats, at: Floats) -> Floats:
