@@ -120,7 +120,7 @@ def command(
     book = read_recipes(config)
     folder = _cache_folder(book.folder, cache)
     last = journals.read_journal(folder / journals.NAME)
-    record = outputs.read_outputs(folder / outputs.NAME, book.folder, last)
+    record = outputs.read_outputs(folder / outputs.NAME, book.path, last)
     is_all, chosen = not (inputs or recipe), chosen_recipes(book, recipe or ())
     try:
         planned = plan_jobs(book, chosen, inputs or (), record, named=bool(recipe))
@@ -140,11 +140,12 @@ def command(
     results = caching.ResultCache(folder)
     results.prepare()
     if record.unsaved:  # before a new journal is begun
-        record.save(record.unsaved)
+        record.save({})
     processes = jobs or os.cpu_count() or 1
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
-        journal = stack.enter_context(journals.open_journal(folder / journals.NAME, len(planned), last, resume=resume))
+        path, settings = folder / journals.NAME, book.path.name
+        journal = stack.enter_context(journals.open_journal(path, settings, len(planned), last, resume=resume))
         run = RecipeRun(planned, journal, None if no_cache else results, reporter, processes, cluster)
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +15,8 @@ from anim.caches.source_document.lit_meshes import has_lit_normals, has_mapped_t
 from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import RangeError
-from anim.files import guard, resolver
 from anim.gltf.document import Document
-from anim.gltf.io import images
-from anim.gltf.io.source import Source
+from anim.gltf.io.source import Source, move_images
 from anim.gltf.reading import reader
 from anim.gltf.writing.draco_decoding import decode_draco
 from anim.model import Clip, Scene, VertexCache
@@ -145,9 +142,4 @@ def prepare_source(document: Document, source: Source, meshes: set[int], output:
     document = decode_draco(document, meshes)
     if source.folder is None or source.is_in_folder(output.path):
         return document
-    document, copies = images.copy_images(document, source.folder, resolver.resolve_links(Path(output.path)).parent)
-    guard.plan(Path(output.path), in_place=True)  # before an image is copied
-    guard.plan_new(copies)
-    if not output.dry_run:
-        images.write_copies(copies)
-    return document
+    return move_images(document, source.folder, output.path, dry_run=output.dry_run)

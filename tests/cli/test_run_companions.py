@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -110,3 +111,49 @@ def test_missing_images_are_noted_and_in_the_journal(text_file: Path, call: Call
         assert journal(text_file)[0]["messages"] == [line]
         (text_file / "build/arm.bin").unlink()
     assert "note" not in call("run", "-q").err
+
+
+@pytest.mark.parametrize("ending", [".gltf", ".glb"])
+@pytest.mark.parametrize("order", ["at once", "one after the other"])
+def test_inputs_of_the_same_content_have_buffers_of_their_own(
+    ending: str, order: str, text_file: Path, call: Call
+) -> None:
+    """The text of two exports of a rig may be the same, with motion in the .bin beside it."""
+    (text_file / "gltf-anim.toml").unlink()
+    write_recipe(text_file, "resample --fps 12", match="*/arm.gltf", out=f"build/{{folder}}/{{stem}}{ending}")
+    shutil.copytree(text_file / "crowd", text_file / "other")
+    flip_end(text_file / "other/arm.bin")
+    made = [f"build/{folder}/arm{'.bin' if ending == '.gltf' else ending}" for folder in ("crowd", "other")]
+    call("run", "--no-cache").product()
+    expected = [(text_file / name).read_bytes() for name in made]
+    assert expected[0] != expected[1]
+    shutil.rmtree(text_file / "build")
+    for folders in [()] if order == "at once" else [("crowd/arm.gltf",), ("other/arm.gltf",)]:
+        call("run", *folders).product()
+    assert [(text_file / name).read_bytes() for name in made] == expected
+    shutil.rmtree(text_file / "build")
+    assert "2 files: 2 cached" in call("run").err
+    assert [(text_file / name).read_bytes() for name in made] == expected
+
+
+@pytest.mark.parametrize("is_link", [False, True])
+def test_a_buffer_of_the_input_at_the_place_of_the_output_is_not_replaced(
+    is_link: bool, text_file: Path, call: Call
+) -> None:
+    """The input was lost."""
+    (text_file / "gltf-anim.toml").unlink()
+    write_recipe(text_file, "resample --fps 12", match="crowd/*.gltf", out="{folder}/{stem}.glb")
+    buffer = text_file / f"crowd/arm.{'bin' if is_link else 'glb'}"
+    if is_link:
+        call("run").product()  # now from the cache
+        (text_file / "crowd/arm.glb").unlink()
+        (text_file / "crowd/arm.glb").symlink_to("arm.bin")
+    else:
+        (text_file / "crowd/arm.bin").rename(buffer)
+        path = text_file / "crowd/arm.gltf"
+        path.write_text(path.read_text().replace("arm.bin", "arm.glb"))
+    before = buffer.read_bytes()
+    run = call("run")
+    assert run.code == 3
+    assert "'crowd/arm.glb', the output of 'crowd/arm.gltf', is a file that its own steps read" in run.err
+    assert buffer.read_bytes() == before

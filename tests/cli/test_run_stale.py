@@ -60,6 +60,24 @@ def test_a_mistyped_pattern_deletes_nothing(made: Path, call: Call) -> None:
     assert outputs(made) == before
 
 
+@pytest.mark.parametrize("is_saved", [True, False])
+def test_outputs_of_other_settings_in_the_folder_are_not_stale(is_saved: bool, made: Path, call: Call) -> None:
+    """Nor are they inputs of their own recipe. It deleted them, and two settings deleted each other's outputs."""
+    call("run", "--delete-stale").product()
+    text = (made / "gltf-anim.toml").read_text()
+    (made / "small.toml").write_text(text.replace("build/", "small/"))
+    if not is_saved:
+        (made / ".gltf-anim-cache/outputs.json").unlink()
+    assert "note" not in call("run", "--config", "small.toml", "--delete-stale").err
+    assert "note" not in call("run", "--delete-stale").err
+    assert outputs(made) == {"build/crowd/hero.glb"}
+    assert (made / "small/crowd/hero.glb").exists()
+    write_crowd(made, cube="morph_cube")
+    call("run", "--config", "small.toml").product()
+    (made / "crowd/cube.glb").unlink()
+    assert "(small/crowd/cube.glb): deleted" in call("run", "--config", "small.toml", "--delete-stale").err
+
+
 def test_only_unchanged_outputs_of_earlier_runs_are_deleted(made: Path, call: Call) -> None:
     (made / "build/crowd/cube.glb").write_bytes(b"other")
     (made / "build/notes.glb").write_bytes(b"mine")

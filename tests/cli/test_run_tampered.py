@@ -31,7 +31,7 @@ def add_output(folder: Path, name: str, path: Path) -> None:
     record = folder / CACHE / "outputs.json"
     content = json.loads(record.read_text())
     found = path.stat()
-    content["folders"][str(folder)][name] = ["gone.glb", [found.st_size, found.st_mtime_ns]]
+    content["folders"][str(folder)][name] = ["gone.glb", [found.st_size, found.st_mtime_ns], "gltf-anim.toml"]
     record.write_text(json.dumps(content))
 
 
@@ -181,7 +181,9 @@ def test_a_wrong_record_of_a_result_is_as_if_absent(values: dict[str, Any], made
     assert "1 file: 1 made" in call("run", "--verbose").err
 
 
-@pytest.mark.parametrize("value", [["a.glb", [float("inf"), 2]], ["a.glb", 5], [1, [1, 2]], 5])
+@pytest.mark.parametrize(
+    "value", [["a.glb", [float("inf"), 2], "x"], ["a.glb", 5, "x"], [1, [1, 2], "x"], ["a.glb", [1, 2], 3], 5]
+)
 def test_a_wrong_entry_of_outputs_costs_no_other(value: object, made: Path, call: Call) -> None:
     path = made / CACHE / "outputs.json"
     content = json.loads(path.read_text())

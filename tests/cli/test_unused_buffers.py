@@ -148,6 +148,11 @@ def scene_above(folder: Path) -> None:
     (folder.parent / "scene.gltf").write_text(text.replace("walk.bin", "folder/walk%2Ebin"))
 
 
+def escaped(folder: Path) -> None:
+    text = (folder / "walk.gltf").read_text()
+    (folder / "other.gltf").write_text(text.replace("walk.bin", "w\\u0061lk.bin"))
+
+
 def link_beside(folder: Path) -> None:
     (folder / "other.bin").symlink_to("walk.bin")
 
@@ -161,6 +166,7 @@ def link_above(folder: Path) -> None:
     [
         *map(backup, ("walk.gltf.bak", "walk.gltf~", "walk.old", "copy.GLTF", "walk.json")),
         scene_above,
+        escaped,
         link_beside,
         link_above,
     ],

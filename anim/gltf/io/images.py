@@ -56,32 +56,32 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
     return changed, copies
 
 
-def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> None:
+def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> bool:
     """Copy images to free names; an existing file there has the same bytes. Raises OutputError.
 
-    within: a folder that none of them may leave by a link.
+    within: a folder that none of them may leave by a link. Returns False if another process gave a name to another
+    file meanwhile, as one of the same run does: names must be chosen again.
     """
     if within is not None:
         for path in copies:
             _check_place(path, within)
     if copies:
         guard.begin()
-    for path, file in copies.items():
-        with atomic.name_errors(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if not path.exists():
-                with atomic.temporary_files() as made:
-                    temporary = atomic.write_temporary(path, _blocks(file), made)
-                    _place(temporary, path, file)
+    return all(_write_copy(path, file) for path, file in copies.items())
 
 
-def _place(temporary: Path, path: Path, file: Path) -> None:
-    """Give a copy its name; another process, as of the same run, may have made the same copy meanwhile."""
-    try:
-        atomic.move_to_free(temporary, path)
-    except FileExistsError:
-        if not _is_same(path, file):
-            raise
+def _write_copy(path: Path, file: Path) -> bool:
+    with atomic.name_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists():
+            return _is_same(path, file)
+        with atomic.temporary_files() as made:
+            temporary = atomic.write_temporary(path, _blocks(file), made)
+            try:
+                atomic.move_to_free(temporary, path)
+            except FileExistsError:
+                return _is_same(path, file)
+    return True
 
 
 def _check_place(path: Path, folder: Path) -> None:

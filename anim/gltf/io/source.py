@@ -8,12 +8,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
-from anim.errors import FormatError, not_written
+from anim.errors import FormatError, OutputError, not_written
 from anim.files import resolver
 from anim.gltf.document import Buffer, Bytes, Document, json_array
 from anim.gltf.io import container, json_text, uri
 from anim.gltf.io.buffers import Resolve
 
+MAX_NAME_ATTEMPTS = 20  # attempts to name images, while others write into the same folder
 MAX_OPEN_ATTEMPTS = 20  # attempts to open a .gltf with its buffers, while others replace it
 
 Opener: TypeAlias = Callable[[Bytes, Resolve | None], Document]
@@ -116,17 +117,13 @@ def write_file(
     """
     from anim.files import atomic, guard
     from anim.files.special_files import is_special
-    from anim.gltf.io import gltf_files, images
+    from anim.gltf.io import gltf_files
 
-    copies: dict[Path, Path] = {}
     folder = None if source is None or source.is_in_folder(path) or is_special(Path(path)) else source.folder
-    if folder is not None:
-        document, copies = images.copy_images(document, folder, resolver.resolve_links(Path(path)).parent)
-        unchanged = None if copies else unchanged  # copies may have got other names
-    guard.plan(Path(path), in_place=True)  # before an image is copied
-    guard.plan_new(copies)
-    if not dry_run:
-        images.write_copies(copies, within)
+    moved = document if folder is None else move_images(document, folder, path, within=within, dry_run=dry_run)
+    unchanged = unchanged if moved is document else None  # copies may have got other names
+    document = moved
+    guard.plan(Path(path), in_place=True)
     if not path.lower().endswith(".gltf"):
         content = glb_chunks(document, unchanged)
         if not dry_run:
@@ -139,6 +136,26 @@ def write_file(
         document, Path(path), same_folder=same_folder, spared=[*spared, *needed], text=text, dry_run=dry_run, note=note
     )
     return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
+
+
+def move_images(
+    document: Document, folder: Path, path: str, *, within: Path | None = None, dry_run: bool = False
+) -> Document:
+    """Copy the images of a document in `folder` to the folder of an output; return the document with their names.
+
+    The document itself if it has none. within: as of `write_file`. Raises OutputError.
+    """
+    from anim.files import guard
+    from anim.gltf.io import images
+
+    target = resolver.resolve_links(Path(path)).parent
+    for _ in range(MAX_NAME_ATTEMPTS):
+        moved, copies = images.copy_images(document, folder, target)
+        guard.plan(Path(path), in_place=True)  # before an image is copied
+        guard.plan_new(copies)
+        if dry_run or images.write_copies(copies, within):
+            return moved
+    raise OutputError(f"{path}: names of its images are taken by other files again and again")
 
 
 def glb_chunks(document: Document, unchanged: Bytes | None = None) -> list[Bytes]:

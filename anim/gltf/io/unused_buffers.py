@@ -132,7 +132,7 @@ def _begins_like_gltf(path: Path) -> bool:
 
 def _may_name(json: bytes, name: str) -> bool:
     """Return False if the name is not in the JSON: a fast test for folders with many files."""
-    is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and b"%" not in json
+    is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and b"%" not in json and b"\\u" not in json
     return not is_plain or name.encode() in json
 
 

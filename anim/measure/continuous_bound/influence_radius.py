@@ -84,17 +84,18 @@ def _morphing(part: SkinnedGroups, old: Binding, new: Binding) -> Morphing:
 
 
 def _arms(part: SkinnedGroups, points: Floats, bind: Floats, one: float) -> Floats:
-    """The longest vector (V, 3) per used joint (J,), in the joint's space by `bind` (J, 3, 4).
+    """The longest vector per used joint (J,), in the joint's space by `bind` (J, 3, 4).
 
-    one: 1 for points, 0 for directions.
+    points: (V, 3), or (V, I, 3) with those of each influence. one: 1 for points, 0 for directions.
     """
     result = np.zeros(len(part.used))
     influences = list(zip(part.surface.joints.T, part.surface.weights.T, strict=True))
     for some in (slice(start, start + BLOCK) for start in range(0, len(points), BLOCK)):
-        for joints, weights in influences:
+        for i, (joints, weights) in enumerate(influences):
+            own = points[some] if points.ndim == 2 else points[some, i]
             carried: Bools = np.asarray(weights[some] > 0)
             chosen = joints[some][carried]
             matrices = bind[chosen]
-            moved = np.einsum("vij,vj->vi", matrices[..., :3], points[some][carried]) + one * matrices[..., 3]
+            moved = np.einsum("vij,vj->vi", matrices[..., :3], own[carried]) + one * matrices[..., 3]
             np.maximum.at(result, np.searchsorted(part.used, chosen), np.sqrt((moved * moved).sum(axis=1)))
     return result

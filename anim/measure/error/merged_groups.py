@@ -140,6 +140,8 @@ def _by_anchor(anchors: Ints, moving: Bools) -> list[tuple[int, Ints]]:
 def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton) -> tuple[Surface, Binding | None]:
     """A surface on kept nodes, and its joints in the second version if they differ."""
     anchors, offsets = skeleton.anchors, skeleton.offsets
+    if not len(surface.targets) and (binding is None or _has_joints(surface, binding)):
+        return _fold(surface, skeleton), None
     old = surface._replace(
         nodes=anchors[surface.nodes],
         bind=matrix.multiply(offsets[surface.nodes], surface.bind),
@@ -153,6 +155,23 @@ def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton
         owner=int(anchors[binding.owner]),
     )
     return old, None if _has_joints(old, new) and not len(surface.targets) else new
+
+
+def _fold(surface: Surface, skeleton: ReducedSkeleton) -> Surface:
+    """A surface without morph targets on kept nodes: joints that follow the same one are one joint.
+
+    Its points (V, I, 3) are those of each influence, in the space of the kept node.
+    """
+    anchors = skeleton.anchors[surface.nodes]
+    nodes = np.flatnonzero(np.bincount(anchors))
+    to_anchor = matrix.multiply(skeleton.offsets[surface.nodes], surface.bind)
+    return surface._replace(
+        nodes=nodes,
+        bind=np.broadcast_to(IDENTITY, (len(nodes), 3, 4)),
+        points=matrix.apply(to_anchor[surface.joints], surface.points[:, None, None])[:, :, 0],
+        joints=np.searchsorted(nodes, anchors)[surface.joints],
+        owner=int(skeleton.anchors[surface.owner]),
+    )
 
 
 def _has_joints(surface: Surface, binding: Binding) -> bool:

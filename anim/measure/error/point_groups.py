@@ -7,7 +7,7 @@ that one product of matrices computes it for many vertices and times.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from anim.arrays import Floats, Ints
 from anim.maths import matrix
 from anim.measure.error.displacement import BoundGroups, DisplacementField, MorphedDisplacement, SkinnedDisplacement
+from anim.measure.error.influences import GroupedInfluences
 from anim.measure.error.max_displacement import MaxDisplacement
 from anim.measure.error.morph_bounds import SIDES, Change, MorphBounds
 from anim.measure.error.surface import Surface, morph_points, skin_points
@@ -87,6 +88,7 @@ class PointGroups(Protocol):
 class SkinnedGroups:
     """A surface with vertices grouped by their main joint, and boxes around joints' vertices.
 
+    surface: its points can be (V, I, 3), of each influence, if it has no morph targets.
     new: joints of the surface in the second version, if they differ. used: indices of the joints with influence.
     reach: of each group the joints with influence, as indices into `used`. fraction: the largest sum of skin weights of
     a vertex. bound_groups: the vertices at the rest weights of morph targets, in mesh space.
@@ -99,13 +101,18 @@ class SkinnedGroups:
         rest = surface.points
         if len(surface.targets):
             rest = rest + np.tensordot(surface.rest_weights, surface.targets, axes=1)
-        self.fraction, self.used, self._influences = self._influenced()
-        found = self._grouped()
-        self._leaders, self.groups = list(found), list(found.values())
-        self.reach = [self._reach(group) for group in self.groups]
-        products = [self._products(rest, *each) for each in zip(self.groups, self.reach, strict=True)]
-        self.bound_groups = BoundGroups(self.reach, products, self._boxes(rest), self.fraction)
-        corners = self._boxes(surface.points) if len(surface.targets) else self.bound_groups.corners
+        self.fraction, self.used, influences = self._influenced()
+        boxes: Callable[[Floats], Floats]
+        if surface.is_rigid:  # often one of thousands, or with points of thousands of nodes
+            self._leaders, self.groups, self.reach = [0], [np.arange(len(surface.points))], [self.used]
+            products = [np.concatenate((rest, np.ones((len(rest), 1))), axis=1)]
+            boxes = _whole_box
+        else:
+            grouped = GroupedInfluences(influences, surface.weights, len(self.used))
+            self._leaders, self.groups, self.reach = grouped.leaders, grouped.groups, grouped.reach
+            products, boxes = grouped.products(rest), grouped.boxes
+        self.bound_groups = BoundGroups(self.reach, products, boxes(rest), self.fraction)
+        corners = boxes(surface.points) if len(surface.targets) else self.bound_groups.corners
         self._boxed = MorphBounds(corners, np.abs(surface.targets).max(axis=1, initial=0.0), self.fraction)
 
     def field(self, old: PosedSkeleton, new: PosedSkeleton) -> DisplacementField | None:
@@ -166,7 +173,7 @@ class SkinnedGroups:
     def _influenced(self) -> tuple[float, Ints, Ints]:
         """The largest sum of skin weights, the joints with influence (J,), and those of vertices (V, I) into them."""
         surface = self.surface
-        if surface.is_rigid:  # often one of thousands, or with points of thousands of nodes
+        if surface.is_rigid:
             return 1.0, np.zeros(1, np.int64), surface.joints
         carrying = surface.weights > 0
         used = np.array(sorted(set(surface.joints[carrying].tolist())), np.int64)
@@ -174,47 +181,6 @@ class SkinnedGroups:
         place[used] = np.arange(len(used))
         fraction = max(float(surface.weights.sum(axis=1).max(initial=0.0)), 1e-30)
         return fraction, used, np.where(carrying, place[surface.joints], 0)
-
-    def _grouped(self) -> dict[int, Ints]:
-        """Indices of the vertices by the joint with the largest weight; without vertices that have none."""
-        if not len(self.used):
-            return {}
-        if self.surface.is_rigid:
-            return {0: np.arange(len(self.surface.points))}
-        first = self.surface.weights.argmax(axis=1)
-        leader = np.take_along_axis(self._influences, first[:, None], axis=1)[:, 0]
-        leader = np.where((self.surface.weights > 0).any(axis=1), leader, -1)
-        return {joint: group for joint in range(len(self.used)) if len(group := np.flatnonzero(leader == joint))}
-
-    def _reach(self, group: Ints) -> Ints:
-        """The joints with influence on a group, as indices into `used`."""
-        if self.surface.is_rigid:
-            return self.used
-        carrying = self.surface.weights[group] > 0
-        return np.array(sorted(set(self._influences[group][carrying].tolist())), np.int64)
-
-    def _boxes(self, points: Floats) -> Floats:
-        """Corners (J, 8, 3) of the box around all vertices with influence of each used joint."""
-        if self.surface.is_rigid:
-            return _box(points)[None]
-        carrying = self.surface.weights > 0
-        corners = []
-        for joint in range(len(self.used)):
-            corners.append(_box(points[((self._influences == joint) & carrying).any(axis=1)]))
-        return np.array(corners).reshape(-1, 8, 3)
-
-    def _products(self, points: Floats, group: Ints, reach: Ints) -> Floats:
-        """Factors of matrices (V_g, J_g · 4): skin weight times x, y, z, 1, per joint with influence."""
-        if self.surface.is_rigid:
-            return np.concatenate((points, np.ones((len(points), 1))), axis=1)
-        result = np.zeros((len(group), len(reach), 4))
-        rows = np.arange(len(group))
-        whole = np.column_stack((points[group], np.ones(len(group))))
-        for i in range(self._influences.shape[1]):
-            weights = self.surface.weights[group, i]
-            columns = np.where(weights > 0, np.searchsorted(reach, self._influences[group, i]), 0)
-            result[rows, columns] += np.where(weights > 0, weights, 0)[:, None] * whole
-        return result.reshape(len(group), -1)
 
     def _displaced(self, frames: Ints, old: PosedSkeleton, new: PosedSkeleton) -> Floats:
         """Displacement of every vertex (V, 3, f) in some frames, morphed and then skinned."""
@@ -227,6 +193,6 @@ class SkinnedGroups:
         return result
 
 
-def _box(points: Floats) -> Floats:
-    """Corners (8, 3) of the box around points (V, 3)."""
-    return np.asarray(np.where(SIDES < 0, points.min(axis=0), points.max(axis=0)))
+def _whole_box(points: Floats) -> Floats:
+    """Corners (1, 8, 3) of the box around all points (V, 3)."""
+    return np.asarray(np.where(SIDES < 0, points.min(axis=0), points.max(axis=0)))[None]

@@ -22,7 +22,7 @@ from cli.workflows.run.stamps import FileStatus, is_size, status_of
 from cli.workflows.run.steps import MAKING, Step
 
 NAME = ".gltf-anim-cache"  # of the default folder, beside the settings
-FORMAT = 1
+FORMAT = 2
 HASH = re.compile("[0-9a-f]{64}")
 MAX_HASHED_BYTES = 1 << 32  # longest GLB; a hole in a file may be longer than can be read
 KEEPING_FILES = frozenset({".gitignore", ".gitkeep"})  # by which git keeps a folder that is new otherwise
@@ -166,6 +166,14 @@ def result_key(recipe: str, steps: tuple[Step, ...], path: str, digest: str) -> 
     """Return the hash of a recipe on an input's content. path: of the input, whose name a new clip takes."""
     name = PurePosixPath(path).name if steps[0].command[0] in MAKING else ""
     return _hash_json([recipe, digest, name])
+
+
+def path_key(key: str, path: str) -> str:
+    """Return the key of a result that other files beside the input have a part in. path: of the input.
+
+    Another input of the same content, in another folder, has its own buffers there.
+    """
+    return _hash_json([key, path])
 
 
 def hash_of(data: Bytes) -> str:

@@ -26,7 +26,7 @@ from cli.io.documents import PIPE
 from cli.reports import image_notes
 from cli.streams import StepStreams, use_streams
 from cli.text import Reporter
-from cli.workflows.run.cache import FileHashes, ResultCache
+from cli.workflows.run.cache import FileHashes, ResultCache, path_key
 from cli.workflows.run.places import check_output
 from cli.workflows.run.stamps import FileStatus, Stamp, stamp_files, stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import Step
@@ -146,10 +146,12 @@ def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int) -> Non
     others.pop(os.path.normpath(job.input), None)
     if status_of(job.folder / job.input) != job.status or stamp_read(job.folder, others, began_ns) is None:
         return
+    named = {os.path.normpath(name) for step in job.steps for name in step.files}
+    key = job.key if named.issuperset(others) else path_key(job.key, job.input)
     document = container.read(product)
     is_plain = not any(images.external_uri(image) for image in json_array(document.json, "images"))
     assert job.cache is not None
-    ResultCache(job.cache).store(job.key, product, others, is_plain=is_plain)
+    ResultCache(job.cache).store(key, product, others, is_plain=is_plain)
 
 
 def write_output(
@@ -167,7 +169,7 @@ def write_output(
 
 
 def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
-    check_output(job)
+    check_output(job, spared)
     path = job.folder / job.output
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

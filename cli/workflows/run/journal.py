@@ -26,7 +26,7 @@ class JournalEntry:
     files: stamps by path of the other files that were read and written, such as buffers and images; None in a journal
     of an earlier version. size: bytes of the output with its buffers.
     status: MADE, CACHED, DONE_BEFORE (in an earlier run that is resumed) or FAILED.
-    messages: of failed files, else warnings and notes.
+    messages: of failed files, else warnings and notes. settings: name of the settings file; "" in an earlier version.
     """
 
     input: str
@@ -40,6 +40,7 @@ class JournalEntry:
     output_stamp: Stamp | None = None
     files: dict[str, Stamp | None] | None = None
     messages: tuple[str, ...] = ()
+    settings: str = ""
 
 
 Entries: TypeAlias = Mapping[tuple[str, str], JournalEntry]  # the last ones, by input and output
@@ -49,16 +50,17 @@ Entries: TypeAlias = Mapping[tuple[str, str], JournalEntry]  # the last ones, by
 class Journal:
     """Journal that a run writes; a line is complete in the file as soon as it is written.
 
-    earlier: entries of the run that is resumed.
+    settings: name of the settings file. earlier: entries of the run that is resumed.
     """
 
     path: Path
     file: io.FileIO
+    settings: str
     earlier: Entries
 
     def write(self, entry: JournalEntry) -> None:
         """Append a line."""
-        self.write_line(asdict(entry))
+        self.write_line({**asdict(entry), "settings": self.settings})
 
     def write_line(self, value: dict[str, Any]) -> None:
         """Append a JSON object as a line. Raises OutputError."""
@@ -77,14 +79,14 @@ class Journal:
 
 
 @contextmanager
-def open_journal(path: Path, files: int, last: Entries, *, resume: bool) -> Iterator[Journal]:
+def open_journal(path: Path, settings: str, files: int, last: Entries, *, resume: bool) -> Iterator[Journal]:
     """Open the journal of a run. Raises OutputError.
 
     resume: append to that of the last run, with its entries, else begin a new one; while another run writes there, both
     have one.
     """
     with own_files.open_for_lines(path, append=resume) as file:
-        journal = Journal(path, file, last if resume else {})
+        journal = Journal(path, file, settings, last if resume else {})
         if resume:
             write_stream(file, [b"\n"], str(path))  # ends a line that was cut off
         journal.write_line({"run": {"version": __version__, "files": files, "resumed": resume}})
@@ -111,7 +113,7 @@ def _entry(value: dict[str, Any]) -> JournalEntry:
     if value.get("files") is not None:
         parsed["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
     messages = value.get("messages", [])
-    texts = [value[key] for key in ("input", "output", "recipe", "status")]
+    texts = [*(value[key] for key in ("input", "output", "recipe", "status")), value.get("settings", "")]
     if not isinstance(messages, list) or not all(isinstance(each, str) for each in [*texts, *messages]):
         raise TypeError("is no entry of a journal")
     if not is_size(value.get("size", 0)) or type(value.get("code", 0)) is not int:

@@ -35,7 +35,7 @@ def find_clashes(jobs: Sequence[Job]) -> Iterator[str]:
     made = dict[str, str]()
     for job in jobs:
         real = name_key(real_of(os.path.join(job.folder, job.output)))
-        if problem := _problem(job, real_of):
+        if problem := _problem(job, real_of, _step_files(job)):
             yield problem
         elif real in read:
             yield f"'{job.output}', the output of '{job.input}', is the input '{read[real]}'"
@@ -43,9 +43,12 @@ def find_clashes(jobs: Sequence[Job]) -> Iterator[str]:
             yield f"'{job.output}' and '{other}' are the same output{say_where_equal(job.output, other)}"
 
 
-def check_output(job: Job) -> None:
-    """Raise OutputError if the output isn't where a job may write; asked again before writing: links may be new."""
-    if problem := _problem(job, os.path.realpath):
+def check_output(job: Job, read: Iterable[Path] = ()) -> None:
+    """Raise OutputError if the output isn't where a job may write; asked again before writing: links may be new.
+
+    read: files that its steps read, of which some are known by now only: the input's buffers.
+    """
+    if problem := _problem(job, os.path.realpath, [*_step_files(job), *map(str, read)]):
         raise OutputError(problem)
 
 
@@ -66,12 +69,10 @@ def _step_files(job: Job) -> Iterator[str]:
         yield from step.files
 
 
-def _problem(job: Job, real_of: RealPath) -> str:
-    """Problem of the output of a job by its own files, empty without any."""
+def _problem(job: Job, real_of: RealPath, read: Iterable[str]) -> str:
+    """Problem of the output of a job by its own files, empty without any. read: by its steps."""
     real = real_of(os.path.join(job.folder, job.output))
-    key, input, *files = (
-        name_key(real_of(os.path.join(job.folder, name))) for name in (job.output, job.input, *_step_files(job))
-    )
+    key, input, *files = (name_key(real_of(os.path.join(job.folder, name))) for name in (job.output, job.input, *read))
     if key == input:
         return f"'{job.input}' is its own output ('{job.output}' is a link to it, below one, or differs by case only)"
     if key in files:

@@ -16,7 +16,7 @@ from cli.errors import run_guarded
 from cli.progress import Progress
 from cli.streams import StepStreams, use_streams
 from cli.text import Reporter, format_change, format_duration
-from cli.workflows.run.cache import FileHashes, ResultCache, recipe_key, result_key
+from cli.workflows.run.cache import FileHashes, ResultCache, path_key, recipe_key, result_key
 from cli.workflows.run.cluster import Cluster
 from cli.workflows.run.job import (
     EMPTY,
@@ -132,7 +132,9 @@ class RecipeRun:
         began_ns: time before its key was made.
         """
         began = time.perf_counter()
-        record = cache.find(job.key, job.folder, self._hashes)
+        keys = job.key, path_key(job.key, job.input)
+        records = (cache.find(key, job.folder, self._hashes) for key in keys)
+        record = next(filter(None, records), None)
         if record is None:
             return None
         cache.mark_used(record)

@@ -37,9 +37,9 @@ def report_stale(
     Raises OutputError, and UsageError for settings of budgets that are wrong.
     """
     stale = find_stale(record, book, jobs)
-    is_doubtful = delete and not jobs and any((record.folder / record.outputs[name][0]).exists() for name in stale)
+    is_doubtful = delete and not jobs and any((record.folder / record.outputs[name].input).exists() for name in stale)
     delete = delete and not is_doubtful
-    record.save({**record.unsaved, **written})
+    record.save(written)
     if delete and stale:
         _delete(record.folder, stale, _files_read(book, jobs))
         record.save({}, stale)
@@ -55,10 +55,12 @@ def report_stale(
 def find_stale(record: OutputRecord, book: RecipeBook, jobs: Sequence[Job]) -> list[str]:
     """Return the unchanged outputs of earlier runs that no job makes and that nothing here reads, sorted.
 
-    Links, and files behind a link, are left alone: they may be somebody else's.
+    Those of other settings in the folder are left alone, whose recipes may make them; so are links, and files behind a
+    link, which may be somebody else's.
     """
     outputs = {job.output for job in jobs}
-    unused = filter(record.is_unchanged, sorted(record.outputs.keys() - outputs))
+    own = {name for name, each in record.outputs.items() if each.settings == record.settings}
+    unused = filter(record.is_unchanged, sorted(own - outputs))
     found = [name for name in unused if _is_plain(record.folder, name)]
     if not found:
         return []

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
-from anim.errors import OutputError
 from anim.files import atomic
 from anim.gltf.io import images
+from anim.gltf.io.source import open_file, write_file
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
 
@@ -28,10 +29,32 @@ def test_a_copy_that_another_process_makes_meanwhile(
         return write(*args, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr(atomic, "write_temporary", written)
-    if other == PNG:
-        images.write_copies({copy: source})
-    else:
-        with pytest.raises(OutputError):
-            images.write_copies({copy: source})
+    assert images.write_copies({copy: source}) == (other == PNG)
     assert copy.read_bytes() == other
     assert os.listdir(copy.parent) == ["skin.png"]
+
+
+@pytest.mark.parametrize("ending", [".gltf", ".glb"])
+def test_an_image_whose_name_another_process_takes_meanwhile_gets_another_one(
+    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files of one run may have different textures of one name, from several folders; it failed for some of them."""
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in/skin.png").write_bytes(PNG)
+    (tmp_path / "in/a.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "skin.png"}]}))
+    out, other = tmp_path / "out", PNG + b"other"
+    write = atomic.write_temporary
+
+    def written(*args: object, **options: object) -> Path:
+        (out / "skin.png").write_bytes(other)
+        return write(*args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(atomic, "write_temporary", written)
+    source = open_file(str(tmp_path / "in/a.gltf"))
+    out.mkdir()
+    write_file(source.document, str(out / f"a{ending}"), source)
+    (image,) = open_file(str(out / f"a{ending}")).document.json["images"]
+    assert image["uri"] != "skin.png"
+    assert (out / image["uri"]).read_bytes() == PNG
+    assert (out / "skin.png").read_bytes() == other
+    assert len(list(out.iterdir())) == 3

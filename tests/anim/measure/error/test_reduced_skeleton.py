@@ -12,6 +12,7 @@ from anim.maths import matrix, quaternion
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error import reduced_skeleton
 from anim.measure.error.metric import ErrorMetric
+from anim.measure.error.point_groups import SkinnedGroups
 from anim.measure.error.sample_times import dense_times
 from anim.measure.error.statistics import statistics
 from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Skin
@@ -147,3 +148,13 @@ def test_rigid_points_are_moved_at_once(meshes: bool, monkeypatch: pytest.Monkey
     ErrorMetric(scene, clips=_clips(random))
     assert len(calls) <= 3
     assert max(calls) > 5
+
+
+def test_joints_on_one_moving_node_are_one() -> None:
+    """A skin of thousands of joints, of which one moves, is measured at the cost of two."""
+    random = np.random.default_rng(2)
+    scene = _scene(random, meshes=True)
+    before, after = clip(track("translation", TIMES, np.eye(3), node=0)), clip()
+    (body,) = (part for part in ErrorMetric(scene, clips=(before, after)).parts if part.name == "body")
+    assert isinstance(body, SkinnedGroups)
+    assert len(body.surface.nodes) <= 2 < len(scene.instances[0].skin.joints)  # type: ignore[union-attr]
