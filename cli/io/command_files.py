@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from anim.files import guard
 from anim.files.special_files import descriptor_of, is_device_or_pipe
-from cli.errors import UsageError
+from cli.errors import RefusedOutputError, UsageError
 
 PIPE = "-"
 
@@ -123,7 +123,7 @@ def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
             name = first if first != option else "an input"
             raise UsageError(f"{path}: {option} would replace {name} (expected another file)")
         if path not in values and real in inputs and PurePath(real).suffix.lower() != PurePath(path).suffix.lower():
-            raise UsageError(f"{path}: is a link to an input of another format (expected another file)")
+            raise RefusedOutputError(f"{path}: is a link to an input of another format (expected another file)")
 
 
 def _place(path: Path) -> str:
@@ -131,13 +131,13 @@ def _place(path: Path) -> str:
     return os.path.normcase(os.path.join(os.path.realpath(path.parent), path.name))
 
 
-def _replaces(input: str, output: str = "") -> UsageError:
+def _replaces(input: str, output: str = "") -> RefusedOutputError:
     if output:
-        return UsageError(
+        return RefusedOutputError(
             f"{input}: would be replaced by the file of this name beside {output}", help="choose another name for OUT"
         )
-    return UsageError(f"{input}: is an input, and would be replaced by an output (expected another file)")
+    return RefusedOutputError(f"{input}: is an input, and would be replaced by an output (expected another file)")
 
 
-def _is_twice(path: Path) -> UsageError:
-    return UsageError(f"{path}: two outputs would be written to this file (expected different files)")
+def _is_twice(path: Path) -> RefusedOutputError:
+    return RefusedOutputError(f"{path}: two outputs would be written to this file (expected different files)")
