@@ -49,13 +49,22 @@ class CommandFiles:
                 if self._replaced.get(place) is False:
                     raise _replaces(str(path))
 
-    def plan(self, main: Path, companions: Iterable[Path] = (), *, in_place: bool = False) -> None:
-        """Add files that are replaced. Raises UsageError for an input, or another output."""
+    def plan(self, main: Path, companions: Iterable[Path] = (), *, in_place: bool = False, suffix: str) -> None:
+        """Add files that are replaced. Raises UsageError for an input, or another output.
+
+        suffix: of the name by which `main` is written: a link to an input of another format is not in its place.
+        """
         owner = {os.path.realpath(main)}
         for path in (main, *companions):
             place = _place(path)
             found = self._read.get(place)
-            if found is not None and not (in_place and found.mains == owner):
+            is_own = found is not None and found.mains == owner
+            if found is not None and is_own and in_place and path == main and not _has_suffix(suffix, found.name, main):
+                raise RefusedOutputError(
+                    f"{found.name}: is an input of another format, and would be replaced through a link "
+                    "(expected another file)"
+                )
+            if found is not None and not (in_place and is_own):
                 raise _replaces(found.name, "" if path == main else str(main))
             again = in_place and self._replaced.get(place) is True  # a product that was tried before
             if not again and (place in self._replaced or place in self._new):
@@ -129,6 +138,10 @@ def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
 def _place(path: Path) -> str:
     """The folder of a file, with links resolved, and its name: of a link itself, which is what a rename replaces."""
     return os.path.normcase(os.path.join(os.path.realpath(path.parent), path.name))
+
+
+def _has_suffix(suffix: str, *names: str | Path) -> bool:
+    return suffix.lower() in {PurePath(each).suffix.lower() for each in names}
 
 
 def _replaces(input: str, output: str = "") -> RefusedOutputError:
