@@ -51,19 +51,26 @@ def test_images_go_along_to_another_folder(out: str, line: list[str], call: Call
     assert (tmp_path / "out" / "skin.png").read_bytes() == PNG
     assert (tmp_path / "out" / "textures" / "a b.jpg").read_bytes() == JPEG
     before = (tmp_path / "out" / "skin.png").stat()
-    call(line[0], path, tmp_path / "out" / out, *line[1:]).product()
+    again = call(line[0], path, tmp_path / "out" / out, *line[1:])
+    again.product()
     assert (tmp_path / "out" / "skin.png").stat() == before
+    assert "copied" not in again.err
+    (tmp_path / "out/textures/a b.jpg").unlink()
+    some = call(line[0], path, tmp_path / "out" / out, *line[1:])
+    assert "note: 1 image copied beside the output (textures/a%20b.jpg)\n" in some.err
 
 
 def test_an_image_of_another_file_is_not_overwritten(call: Call, tmp_path: Path) -> None:
     path = with_images(tmp_path / "in")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "skin.png").write_bytes(b"another")
-    call("convert", path, tmp_path / "out" / "scene.gltf").product()
+    run = call("convert", path, tmp_path / "out" / "scene.gltf")
+    run.product()
     assert (tmp_path / "out" / "skin.png").read_bytes() == b"another"
     written = json.loads((tmp_path / "out" / "scene.gltf").read_text())["images"]
     assert re.fullmatch(r"skin-[0-9a-f]{8}\.png", written[0]["uri"])
     assert (tmp_path / "out" / written[0]["uri"]).read_bytes() == PNG
+    assert f"note: 2 images copied beside the output ({written[0]['uri']}, textures/a%20b.jpg)\n" in run.err
     assert written[1]["uri"] == "textures/a%20b.jpg"
 
 

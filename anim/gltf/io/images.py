@@ -57,9 +57,9 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
 
 
 def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> None:
-    """Copy images to free names; an existing file there has the same bytes. Raises OutputError.
+    """Copy images to free names; an existing file there has the same bytes, and stays. Raises OutputError.
 
-    within: a folder that none of them may leave by a link.
+    Those that are written are named to the guard. within: a folder that none of them may leave by a link.
     """
     if within is not None:
         for path in copies:
@@ -79,6 +79,7 @@ def _place(temporary: Path, path: Path, file: Path) -> None:
     """Give a copy its name; another process, as of the same run, may have made the same copy meanwhile."""
     try:
         atomic.move_to_free(temporary, path)
+        guard.add_copy(path)
     except FileExistsError:
         if not _is_same(path, file):
             raise

@@ -16,12 +16,13 @@ import numpy as np
 from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import AnimError, UnsupportedError, not_written
-from anim.files import atomic
+from anim.files import atomic, guard
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import container, images
 from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
 from anim.gltf.io.text_form import restore_text_form
 from cli import errors, main
+from cli.io import command_files
 from cli.io.documents import PIPE
 from cli.reports import image_notes
 from cli.streams import StepStreams, use_streams
@@ -178,12 +179,14 @@ def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
     if is_text(job.output):
         source = source._replace(document=_as_the_last_step_writes(job, source.document))
     try:
-        size = write_file(source.document, str(path), source, unchanged=product, spared=spared, within=job.folder)
+        with guard.use(command_files.CommandFiles()):  # of this output alone: it names the images that are copied
+            size = write_file(source.document, str(path), source, unchanged=product, spared=spared, within=job.folder)
+            copied = image_notes.copied_names(str(path))
     except AnimError as error:
         error.problem = error.problem.replace(str(path), job.output)
         raise
     if not source.is_in_folder(str(path)):
-        for line in image_notes.notes(source.document, folder, copied=True):
+        for line in image_notes.notes(source.document, folder, copied):
             Reporter().info(line)
     return size
 
