@@ -211,6 +211,7 @@ def command(
             ceiling = None if max_error is None else wanted.bounds.max_error
             wanted, found = optimize_job.optimize_within(optimizer, wanted, max_count, ceiling)
             optimize_report.check(found, optimizer.clips, wanted, optimizer.scale)
+            image_notes.warn_of_pipe(source.document, source.folder, output, reporter)  # the report lists warnings
             about = optimize_outputs.describe(optimizer, wanted, found, source, output, began)
             with (
                 optimize_outputs.write_report(about, reporter, report, dry_run=dry_run),
