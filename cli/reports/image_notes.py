@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from anim.errors import FormatError
@@ -33,8 +33,13 @@ def report(document: Document, source: Source, output: str, reporter: Reporter) 
 
 def copied_names(output: str) -> list[str]:
     """Return the images that were copied since the last call, as URIs from the output's folder."""
+    return relative_names(output, command_files.take_copies())
+
+
+def relative_names(output: str, paths: Iterable[Path]) -> list[str]:
+    """Return paths as URIs from the output's folder."""
     folder = resolver.resolve_links(Path(output)).parent
-    return [uri.from_path(os.path.relpath(each, folder).replace(os.sep, "/")) for each in command_files.take_copies()]
+    return [uri.from_path(os.path.relpath(each, folder).replace(os.sep, "/")) for each in paths]
 
 
 def warn_of_pipe(document: Document, folder: Path | None, output: str, reporter: Reporter) -> None:
