@@ -39,7 +39,7 @@ def report_stale(
     Without any job none is deleted whose input is still there: a pattern is likely to be mistyped.
     Raises OutputError, and UsageError for settings of budgets that are wrong.
     """
-    stale, _ = find_stale(record, book, jobs)
+    stale, changed = find_stale(record, book, jobs)
     is_doubtful = delete and not jobs and any((record.folder / record.outputs[name][0]).exists() for name in stale)
     delete = delete and not is_doubtful
     record.save({**record.unsaved, **written}, {*record.unsaved_copies, *copies})
@@ -51,6 +51,11 @@ def report_stale(
         what = "not deleted, since their inputs are still there" if is_doubtful else what
         reporter.info(
             f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
+        )
+    if changed and delete:
+        names = list_some(changed, MAX_LISTED_OUTPUTS)
+        reporter.info(
+            f"note: no recipe makes {plural(len(changed), 'output')} that changed after its run ({names}): not deleted"
         )
 
 
