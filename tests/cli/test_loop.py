@@ -276,3 +276,11 @@ def test_verdicts_on_real_clips(call: Call, asset: Find) -> None:
 def test_the_shortest_range_has_a_length(shortest: str, call: Call, fixture: Fixture) -> None:
     run = call("loop", fixture("biped"), "--find", f"--shortest={shortest}")
     assert "--shortest is" in refusal(run, 2)
+
+
+def test_a_list_of_clips_that_can_not_be_closed_is_not_cut(call: Call, asset: Find, tmp_path: Path) -> None:
+    """It ended in the middle of a name."""
+    said = refusal(call("loop", asset("Robot.glb"), tmp_path / "out.glb"), 2)
+    assert said.count(" is ") >= 3
+    assert "…" not in said
+    assert said.rstrip().endswith("; and 1 clip more")
