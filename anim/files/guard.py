@@ -24,6 +24,9 @@ class Guard(Protocol):
     def plan_new(self, paths: Iterable[Path]) -> None:
         """Raise an error if one of these files is another output's. They are new, or stay as they are."""
 
+    def add_copy(self, path: Path) -> None:
+        """Note that an image was copied to a path."""
+
     def begin(self) -> None:
         """Do what waits for the first change of a file; an error of it leaves all of them."""
 
@@ -62,6 +65,12 @@ def plan_new(paths: Iterable[Path]) -> None:
     """Ask whether these new files are outputs of their own: see `Guard.plan_new`."""
     if (guard := current()) is not None:
         guard.plan_new(paths)
+
+
+def add_copy(path: Path) -> None:
+    """Note that an image was copied to a path where it was not before."""
+    if (guard := current()) is not None:
+        guard.add_copy(path)
 
 
 def begin() -> None:

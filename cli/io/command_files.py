@@ -29,12 +29,14 @@ class CommandFiles:
     """Files that a command reads and writes, by the names that it uses for them; what `guard` asks.
 
     before_change: called once, before any file is replaced, written directly, or given another time.
+    copies: images that were copied beside outputs, to places without such a file.
     """
 
     def __init__(self) -> None:
         self.inputs: dict[str, None] = {}  # in order
         self.outputs: dict[str, str] = {}  # files of rules, by the names of outputs
         self.before_change: Callable[[], object] | None = None
+        self.copies: list[Path] = []
         self._read: dict[str, _Input] = {}  # by place, and by the real path behind links
         self._replaced: dict[str, bool] = {}  # by place: whether it may be an input
         self._new: set[str] = set()
@@ -78,6 +80,10 @@ class CommandFiles:
                 raise _is_twice(path)
             self._new.add(place)
 
+    def add_copy(self, path: Path) -> None:
+        """Add an image that was copied."""
+        self.copies.append(path)
+
     def inputs_besides(self, main: Path) -> list[Path]:
         """Return the files that were added, without those that belong to `main` alone."""
         owner = {os.path.realpath(main)}
@@ -106,6 +112,14 @@ def inputs_besides(main: Path) -> list[Path]:
     """Return the files that were read so far, without those that belong to `main` alone."""
     files = guard.current()
     return files.inputs_besides(main) if isinstance(files, CommandFiles) else []
+
+
+def take_copies() -> list[Path]:
+    """Return the images that were copied since the last call."""
+    if not isinstance(files := guard.current(), CommandFiles):
+        return []
+    found, files.copies = files.copies, []
+    return found
 
 
 def add_output(path: str, written: str = "") -> None:
