@@ -109,7 +109,7 @@ def command(
         typer.Option(
             "--max-pointer-error",
             metavar="FRACTION",
-            help="Maximum error of tracks that move no node, as a fraction of their range.",
+            help="Maximum error of tracks that move no node and weights that move no vertex, as a part of their range.",
         ),
     ] = "0.01%",
     max_angle: Annotated[
