@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
 from anim.check.finding import Occurrence
-from anim.check.track_table import TrackTable, track_table
+from anim.check.track_table import TrackTable, add_counts, keep_earliest, track_tables
 from anim.gltf.document import Document, Json, json_array, node_label
 from anim.gltf.reading import reader
 from anim.maths import quaternion
@@ -95,14 +95,9 @@ class CheckedFile:
         first, _ = self.subtrees
         return np.searchsorted(np.sort(first[self.skeleton.parents < 0]), first, side="right")
 
-    @cached_property
-    def scales(self) -> TrackTable:
-        """Keys of all scale tracks of the chosen clips."""
-        return self.tracks("scale")
-
-    def tracks(self, path: str, wanted: Callable[[Track], bool] = lambda track: True) -> TrackTable:
-        """Return the keys of tracks of a path in the chosen clips."""
-        return track_table([each for each in self._tracks_by_path.get(path, ()) if wanted(each[1])], path)
+    def tracks(self, path: str, wanted: Callable[[Track], bool] = lambda track: True) -> Iterator[TrackTable]:
+        """Yield the keys of tracks of a path in the chosen clips, those of some tracks at a time."""
+        return track_tables([each for each in self._tracks_by_path.get(path, ()) if wanted(each[1])], path)
 
     @cached_property
     def _tracks_by_path(self) -> dict[str, list[tuple[int, Track]]]:
@@ -114,17 +109,29 @@ class CheckedFile:
                     found.setdefault(track.path, []).append((report.index, track))
         return found
 
-    def per_clip(self, table: TrackTable, counts: Ints) -> Iterator[Occurrence]:
+    def per_clip(self, counted: Iterable[tuple[TrackTable, Ints]]) -> Iterator[Occurrence]:
         """Yield an occurrence for each clip with counts of its tracks (T,) above 0."""
-        for clip, count in table.per_clip(counts):
+        sums: dict[int, int] = {}
+        for table, counts in counted:
+            add_counts(sums, table, counts)
+        for clip, count in sums.items():
             yield self.in_clip(clip, count)
 
-    def at_keys(self, table: TrackTable, marked: Bools) -> Iterator[Occurrence]:
-        """Yield an occurrence for each clip with marked keys (S,), at the first of them."""
-        first = table.first_keys(marked)
-        for clip, count in table.per_clip(table.count_marked(marked)):
+    def at_keys(
+        self, found: Iterable[tuple[TrackTable, Bools]], count: Callable[[Ints], Ints] = lambda counts: counts
+    ) -> Iterator[Occurrence]:
+        """Yield an occurrence for each clip with marked keys (S,), at the first of them.
+
+        count: the count of each track, by the number of its marked keys.
+        """
+        sums: dict[int, int] = {}
+        first: dict[int, tuple[int, float]] = {}
+        for table, marked in found:
+            add_counts(sums, table, count(table.count_marked(marked)))
+            keep_earliest(first, table, marked)
+        for clip, number in sums.items():
             node, time_s = first[clip]
-            yield self.in_clip(clip, count, time_s=time_s, node=node)
+            yield self.in_clip(clip, number, time_s=time_s, node=node)
 
     def at_rotation_steps(
         self, counts: Mapping[int, int], interpolation: Interpolation, is_fault: Callable[[Floats], Bools]
@@ -138,10 +145,11 @@ class CheckedFile:
             return
         rotations = self._tracks_by_path.get("rotation", ())
         chosen = [each for each in rotations if counts.get(each[0]) and each[1].interpolation is interpolation]
-        table = track_table(chosen, "rotation")
-        marked = table.inner_steps()
-        marked[1:] &= is_fault(quaternion.dot(table.values[1:], table.values[:-1]))
-        at = table.first_keys(marked)
+        at: dict[int, tuple[int, float]] = {}
+        for table in track_tables(chosen, "rotation"):
+            marked = table.inner_steps()
+            marked[1:] &= is_fault(quaternion.dot(table.values[1:], table.values[:-1]))
+            keep_earliest(at, table, marked)
         for number in clips:
             node, time_s = at.get(number, (None, None))  # without one: tracks of pointers
             yield self.in_clip(number, counts[number], time_s=time_s, node=node)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from anim.check.checked_file import CheckedFile
 from anim.check.edits import replace_clips
 from anim.check.finding import Occurrence
 from anim.check.rotation_steps import RotationSteps, rotation_steps, steps_of
+from anim.check.track_table import TrackTable
 from anim.gltf.document import Document
 from anim.maths import quaternion
 
@@ -22,7 +23,15 @@ Edit = Callable[[Floats, Bools], Floats]  # keys (S, 4) and marks (S,) → the m
 
 def edit_rotations(file: CheckedFile, found: Sequence[Occurrence], marks: Marks, edit: Edit) -> Document:
     """Return the document with edited rotation keys in the clips of the occurrences, until none is marked."""
-    first = motion = rotation_steps(file)
+    new: dict[tuple[int, int], Floats] = {}
+    for motion in rotation_steps(file):
+        new |= _changed_keys(motion.table, _edited_keys(motion, marks, edit))
+    return _with_keys(file, {key: keys for key, keys in new.items() if key[0] in {each.number for each in found}})
+
+
+def _edited_keys(first: RotationSteps, marks: Marks, edit: Edit) -> Floats:
+    """The keys (S, 4) of a table after the edits."""
+    motion = first
     for _ in range(MAX_PASSES):
         marked = marks(motion)
         if not marked.any():
@@ -32,18 +41,21 @@ def edit_rotations(file: CheckedFile, found: Sequence[Occurrence], marks: Marks,
         motion = steps_of(motion.table._replace(values=keys))
     signs = np.where(quaternion.dot(first.keys, first.table.values) < 0, -1.0, 1.0)
     same = (motion.keys == first.keys).all(axis=1)
-    values = np.where(same[:, None], first.table.values, motion.keys * signs[:, None])
-    return _with_values(file, {each.number for each in found}, first, values)
+    return np.where(same[:, None], first.table.values, motion.keys * signs[:, None])
 
 
-def _with_values(file: CheckedFile, clips: set[int], motion: RotationSteps, values: Floats) -> Document:
-    """The document with other values (S, 4) of tracks in these clips."""
-    table = motion.table
+def _changed_keys(table: TrackTable, values: Floats) -> dict[tuple[int, int], Floats]:
+    """The keys (K, 4) of the tracks whose values (S, 4) differ from those of the table, by clip and node."""
     new = {}
-    for t in range(len(table.starts)):
-        keys = slice(table.starts[t], table.starts[t] + table.counts[t])
-        if int(table.clips[t]) in clips and not np.array_equal(values[keys], table.values[keys]):
-            new[int(table.clips[t]), int(table.nodes[t])] = values[keys]
+    for clip, node, run in zip(table.clips.tolist(), table.nodes.tolist(), table.runs.tolist(), strict=True):
+        keys = slice(table.starts[run], table.starts[run] + table.counts[run])
+        if not np.array_equal(values[keys], table.values[keys]):
+            new[clip, node] = values[keys]
+    return new
+
+
+def _with_keys(file: CheckedFile, new: Mapping[tuple[int, int], Floats]) -> Document:
+    """The document with other keys of rotation tracks, by clip and node."""
     changed = {}
     for number in sorted({clip for clip, _ in new}):
         clip = file.contents.clips[number]

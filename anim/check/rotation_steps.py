@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -40,9 +41,9 @@ class RotationSteps(NamedTuple):
         return np.asarray(np.where(self.is_inner & (lengths > 0), dots / np.where(lengths > 0, lengths, 1), 1.0))
 
 
-def rotation_steps(file: CheckedFile) -> RotationSteps:
-    """Return the steps of all LINEAR rotation tracks with at least MIN_KEYS keys."""
-    return steps_of(file.tracks("rotation", _is_dense))
+def rotation_steps(file: CheckedFile) -> Iterator[RotationSteps]:
+    """Yield the steps of all LINEAR rotation tracks with at least MIN_KEYS keys, those of some tracks at a time."""
+    return map(steps_of, file.tracks("rotation", _is_dense))
 
 
 def steps_of(table: TrackTable) -> RotationSteps:

@@ -24,7 +24,7 @@ TOLERANCE = 1e-3  # of a segment's range
 ANGLE_TOLERANCE_RAD = math.radians(0.05)
 OUTPUTS = ("cubicspline", "linear")
 MIN_TOLERANCE = 2e-7  # of an easing; limit of fits in float64
-MAX_COMPARED_BYTES = 1 << 16  # of values of tracks that are compared; longer ones take as long
+MAX_COMPARED_BYTES = 1 << 16  # of values of tracks that are compared; of longer ones only shared arrays are equal
 EDGE_TOLERANCE_S = 1e-6  # s; a segment that starts less than this before `start` counts as inside
 
 
@@ -76,7 +76,7 @@ def ease(
     new = list(clip.tracks)
     for i in sorted(chosen):
         track = new[i]
-        keys = _compared(track) if track.values.nbytes <= MAX_COMPARED_BYTES else i
+        keys = _compared(track)
         if keys not in made:
             made[keys] = track, job.eased(track)
         new[i] = _repeat(track, *made[keys])
@@ -92,6 +92,8 @@ def check_output(interpolation: str) -> None:
 def _compared(track: Track) -> tuple[object, ...]:
     """All that easing depends on."""
     parts = (track.values, track.in_tangents, track.out_tangents)
+    if track.values.nbytes > MAX_COMPARED_BYTES:
+        return track.time_axis, track.interpolation, track.kind, *map(id, parts)
     keys = (None if part is None else part.tobytes() for part in parts)
     return track.time_axis, track.interpolation, track.kind, track.values.shape, *keys
 

@@ -10,7 +10,7 @@ from anim.errors import FormatError
 from anim.files import resolver
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import uri
-from anim.gltf.io.images import external_uri, find_image, locate_image
+from anim.gltf.io.images import external_uri, is_image, locate_image
 from anim.gltf.io.source import Source
 from anim.units import plural
 from cli.io import command_files, documents
@@ -60,8 +60,10 @@ def notes(document: Document, folder: Path | None, copied: Sequence[str] = ()) -
     copied: names of those that were copied; others are there already.
     """
     outside = [image for image in json_array(document.json, "images") if external_uri(image)]
-    lost = [image["uri"] for image in outside if locate_image(folder, image) is None]
-    found = [image["uri"] for image in outside if find_image(folder, image) is not None]
+    files = [locate_image(folder, image) for image in outside]
+    pairs = list(zip(outside, files, strict=True))
+    lost = [image["uri"] for image, file in pairs if file is None]
+    found = [image["uri"] for image, file in pairs if file is not None and is_image(file, image)]
     known = {*lost, *found}
     others = [image["uri"] for image in outside if image["uri"] not in known]
     if copied:

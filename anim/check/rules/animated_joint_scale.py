@@ -6,29 +6,32 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from anim.arrays import Bools
+from anim.arrays import Ints
 from anim.check.checked_file import CheckedFile
 from anim.check.edits import remove_tracks_at
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
+from anim.check.track_table import TrackTable
 from anim.gltf.document import Document
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks."""
-    yield from file.per_clip(file.scales, _is_moving(file, parameters).astype(np.int64))
+    yield from file.per_clip(_moving(file, parameters))
 
 
-def _is_moving(file: CheckedFile, parameters: Parameters) -> Bools:
-    """Mask (T,) of the scale tracks that scale a joint."""
-    least, most = file.scales.range()
-    wide = (most - least).max(axis=1, initial=0.0) > parameters["range"]
-    return np.asarray(wide & np.isin(file.scales.nodes, file.joints))
+def _moving(file: CheckedFile, parameters: Parameters) -> Iterator[tuple[TrackTable, Ints]]:
+    """Yield scale tracks, and a 1 (T,) for those that scale a joint."""
+    for table in file.tracks("scale"):
+        least, most = table.range()
+        wide = (most - least).max(axis=1, initial=0.0) > parameters["range"]
+        yield table, (wide & np.isin(table.nodes, file.joints)).astype(np.int64)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document without these tracks, as players show it that drop them."""
-    return remove_tracks_at(file, "scale", file.scales.targets(_is_moving(file, parameters)))
+    targets = {target for table, moving in _moving(file, parameters) for target in table.targets(moving > 0)}
+    return remove_tracks_at(file, "scale", targets)
 
 
 RULE = Rule(

@@ -17,6 +17,7 @@ from anim.gltf.document import Document
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
 
+PATHS = ("rotation", "translation")
 MIN_KEYS = 12
 MIN_JUMPS = 2
 STILL_PER_JUMP = 1e-3  # steps smaller than this fraction of the smallest jump are still
@@ -24,16 +25,15 @@ STILL_PER_JUMP = 1e-3  # steps smaller than this fraction of the smallest jump a
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks."""
-    for _, table, mask in _stepped(file, parameters):
-        yield from file.per_clip(table, mask.astype(np.int64))
+    for path in PATHS:
+        yield from file.per_clip((table, mask.astype(np.int64)) for table, mask in _stepped(file, path, parameters))
 
 
-def _stepped(file: CheckedFile, parameters: Parameters) -> Iterator[tuple[str, TrackTable, Bools]]:
-    """Yield path, tracks, and the mask (T,) of those that are stepped."""
-    limits = {"rotation": np.radians(parameters["angle"]), "translation": parameters["distance"] * file.diagonal}
-    for path, limit in limits.items():
-        table = file.tracks(path, _is_dense)
-        yield path, table, _is_stepped(table, _steps(table), limit)
+def _stepped(file: CheckedFile, path: str, parameters: Parameters) -> Iterator[tuple[TrackTable, Bools]]:
+    """Yield tracks of a path, and the mask (T,) of those that are stepped."""
+    smallest = np.radians(parameters["angle"]) if path == "rotation" else parameters["distance"] * file.diagonal
+    for table in file.tracks(path, _is_dense):
+        yield table, _is_stepped(table, _steps(table), smallest)
 
 
 def _is_dense(track: Track) -> bool:
@@ -62,7 +62,12 @@ def _steps(table: TrackTable) -> Floats:
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document with STEP in these tracks: they jump at the key after the slide."""
-    stepped = {(*target, path) for path, table, mask in _stepped(file, parameters) for target in table.targets(mask)}
+    stepped = {
+        (*target, path)
+        for path in PATHS
+        for table, mask in _stepped(file, path, parameters)
+        for target in table.targets(mask)
+    }
 
     def as_step(number: int, track: Track) -> Track:
         is_stepped = (number, track.node, track.path) in stepped

@@ -17,12 +17,8 @@ from anim.gltf.document import Document
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of trembling tracks."""
-    motion = rotation_steps(file)
-    table, running = motion.table, _running(motion, parameters)
-    first = table.first_keys(running)
-    for clip, count in table.per_clip((table.count_marked(running) > 0).astype(np.int64)):
-        node, time_s = first[clip]
-        yield file.in_clip(clip, count, time_s=time_s, node=node)
+    running = ((motion.table, _running(motion, parameters)) for motion in rotation_steps(file))
+    yield from file.at_keys(running, lambda counts: (counts > 0).astype(np.int64))
 
 
 def _running(motion: RotationSteps, parameters: Parameters) -> Bools:

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from anim.arrays import Bools
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
-from anim.check.rotation_steps import rotation_steps
+from anim.check.rotation_steps import RotationSteps, rotation_steps
 from anim.check.rule import Parameter, Parameters, Rule, counted
 
 RATIO = 10.0  # to the two steps on each side
@@ -16,11 +17,14 @@ RATIO = 10.0  # to the two steps on each side
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such steps."""
-    motion = rotation_steps(file)
+    yield from file.at_keys((motion.table, _jumps(motion, parameters["angle"])) for motion in rotation_steps(file))
+
+
+def _jumps(motion: RotationSteps, angle: float) -> Bools:
+    """Mask (S,) of the keys at the end of such a step."""
     angles = motion.angles
     around = np.max([np.roll(angles, by) for by in (-2, -1, 1, 2)], axis=0, initial=0.0)
-    jumps = motion.is_inner & (angles > np.radians(parameters["angle"])) & (angles > RATIO * around)
-    yield from file.at_keys(motion.table, np.asarray(jumps))
+    return np.asarray(motion.is_inner & (angles > np.radians(angle)) & (angles > RATIO * around))
 
 
 RULE = Rule(

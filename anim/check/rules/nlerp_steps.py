@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from anim.arrays import Bools
 from anim.check.checked_file import CheckedFile
 from anim.check.edits import edit_tracks, put_between
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameter, Parameters, Rule, counted
+from anim.check.track_table import TrackTable
 from anim.gltf.document import Document
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
@@ -17,13 +19,16 @@ from anim.model import Interpolation, Track
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such steps."""
-    table = file.tracks("rotation", _is_linear)
+    yield from file.at_keys((table, _wide(table, parameters["angle"])) for table in file.tracks("rotation", _is_linear))
+
+
+def _wide(table: TrackTable, angle: float) -> Bools:
+    """Mask (S,) of the keys at the end of such a step."""
     angles = np.zeros(len(table.values))
     values = quaternion.normalize(table.values)
     dots = np.abs(quaternion.dot(values[1:], values[:-1]))
     angles[1:] = 2 * np.arccos(np.clip(dots, 0, 1))
-    wide = table.inner_steps() & (angles > np.radians(parameters["angle"]))
-    yield from file.at_keys(table, np.asarray(wide))
+    return np.asarray(table.inner_steps() & (angles > np.radians(angle)))
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

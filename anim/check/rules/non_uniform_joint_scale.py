@@ -15,10 +15,13 @@ from anim.check.rule import Parameter, Parameters, Rule, counted
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the joints below others, at rest or in a chosen clip."""
     joints = np.array([joint for joint in file.joints if file.skeleton.parents[joint] >= 0], np.int64)
-    table = file.scales
     at_rest = joints[_is_spread(file.skeleton.scale[joints], parameters["spread"])]
-    animated = table.nodes[table.count_marked(_is_spread(table.values, parameters["spread"])) > 0]
-    for joint in sorted({*at_rest.tolist(), *animated[np.isin(animated, joints)].tolist()}):
+    animated = [
+        table.nodes[table.count_marked(_is_spread(table.values, parameters["spread"])) > 0]
+        for table in file.tracks("scale")
+    ]
+    moving = np.concatenate([np.zeros(0, np.int64), *animated])
+    for joint in sorted({*at_rest.tolist(), *moving[np.isin(moving, joints)].tolist()}):
         yield file.in_node(joint)
 
 

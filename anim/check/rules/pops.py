@@ -17,9 +17,7 @@ from anim.gltf.document import Document
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such keys."""
-    motion = rotation_steps(file)
-    popped, _ = _popped(motion, parameters["angle"])
-    yield from file.at_keys(motion.table, popped)
+    yield from file.at_keys((motion.table, _popped(motion, parameters["angle"])[0]) for motion in rotation_steps(file))
 
 
 def _cubic(keys: Floats, at: Ints) -> Floats:

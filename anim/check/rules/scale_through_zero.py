@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
+from anim.arrays import Bools
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Parameters, Rule, counted
+from anim.check.track_table import TrackTable
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such steps."""
-    table = file.scales
+    yield from file.at_keys((table, _flips(table)) for table in file.tracks("scale"))
+
+
+def _flips(table: TrackTable) -> Bools:
+    """Mask (S,) of the keys whose sign differs from that of the key before."""
     flips = table.inner_steps()
     flips[1:] &= (table.values[1:] * table.values[:-1] < 0).any(axis=1)
-    yield from file.at_keys(table, np.asarray(flips))
+    return flips
 
 
 RULE = Rule(

@@ -17,23 +17,23 @@ from anim.gltf.document import Document
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such tracks, of joints below another joint."""
-    yield from file.per_clip(*_translated(file, parameters))
+    yield from file.per_clip(_translated(file, parameters))
 
 
-def _translated(file: CheckedFile, parameters: Parameters) -> tuple[TrackTable, Ints]:
-    """All translation tracks, and a 1 (T,) for those of inner joints that move."""
+def _translated(file: CheckedFile, parameters: Parameters) -> Iterator[tuple[TrackTable, Ints]]:
+    """Yield translation tracks, and a 1 (T,) for those of inner joints that move."""
     joints = set(file.joints)
     inner = [joint for joint in joints if int(file.skeleton.parents[joint]) in joints]
-    table = file.tracks("translation")
-    least, most = table.range()
-    stretched = (most - least).max(axis=1, initial=0.0) > parameters["range"] * file.diagonal
-    return table, (stretched & np.isin(table.nodes, inner)).astype(np.int64)
+    for table in file.tracks("translation"):
+        least, most = table.range()
+        stretched = (most - least).max(axis=1, initial=0.0) > parameters["range"] * file.diagonal
+        yield table, (stretched & np.isin(table.nodes, inner)).astype(np.int64)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document without these tracks, as players show it that drop them."""
-    table, translated = _translated(file, parameters)
-    return remove_tracks_at(file, "translation", table.targets(translated > 0))
+    targets = {target for table, moving in _translated(file, parameters) for target in table.targets(moving > 0)}
+    return remove_tracks_at(file, "translation", targets)
 
 
 RULE = Rule(

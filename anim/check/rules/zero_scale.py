@@ -18,11 +18,10 @@ SMALL_PER_LIMIT = 10.0  # scale of a fixed key, in smallest scales that are not 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such keys; under STEP they hide a node, which works everywhere."""
-    if not (np.abs(file.scales.values) < parameters["scale"]).any():  # of most files: no second table for these
-        return
-    table = file.tracks("scale", lambda track: track.interpolation is not Interpolation.STEP)
-    zero = np.asarray((np.abs(table.values) < parameters["scale"]).any(axis=1))
-    yield from file.at_keys(table, zero)
+    tables = file.tracks("scale", lambda track: track.interpolation is not Interpolation.STEP)
+    yield from file.at_keys(
+        (table, np.asarray((np.abs(table.values) < parameters["scale"]).any(axis=1))) for table in tables
+    )
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

@@ -6,11 +6,12 @@ translations of the children. Translations correct the rounding of the joints ab
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from anim.arrays import AnyArray, Bools, Floats
+from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.errors import UnsupportedError
 from anim.exchange.usd_skel.skeleton_group import SkeletonGroup
 from anim.maths import matrix, quaternion
@@ -21,6 +22,7 @@ CONSTANT_SCALE_TOLERANCE = 1e-6  # relative
 FLOAT16_ROUNDING = 5e-4  # relative
 MIN_STORED_SCALE = 1e-3  # smaller ones have fewer digits in float16
 MAX_FLOAT16 = float(np.finfo(np.float16).max)
+MAX_BLOCK_JOINTS = 256  # at a time, for memory
 MIN_DETERMINANT = 1e-12  # of a parent's matrix whose rounding can be corrected
 
 
@@ -121,19 +123,32 @@ def joint_samples(group: SkeletonGroup, posed: PosedSkeleton, constant: Floats) 
         np.empty((frames, joints, 3), np.float16),
     )
     exact, stored = np.empty((joints, frames, 3, 4)), np.empty((joints, frames, 3, 4))
-    for i, parent in enumerate(group.parents.tolist()):
-        exact[i] = local[i] if parent < 0 else matrix.multiply(exact[parent], local[i])
-        above = 1.0 if parent < 0 else constant[parent]
-        rotation, scale = _rotation_and_scale(group.joints[i], posed)
-        found.rotation[:, i] = rotation
-        found.scale[:, i] = _as_float16(scale * (above / constant[i]))
-        _check_stored(found.scale[:, i], scale, group.joints[i], posed)
-        wanted = local[i][..., 3] * above
-        found.translation[:, i] = wanted if parent < 0 else _corrected(wanted, exact[i][..., 3], stored[parent])
-        parts = (found.translation[:, i], found.rotation[:, i], found.scale[:, i])
-        own = matrix.from_trs(*(each.astype(np.float64) for each in parts))
-        stored[i] = own if parent < 0 else matrix.multiply(stored[parent], own)
+    for some in _blocks_by_depth(group.parents):
+        parents = group.parents[some]
+        is_root = parents[0] < 0
+        nodes = [group.joints[i] for i in some.tolist()]
+        exact[some] = local[some] if is_root else matrix.multiply(exact[parents], local[some])
+        above = np.ones(len(some)) if is_root else constant[parents]
+        found.rotation[:, some], scale = _rotations_and_scales(nodes, posed)
+        found.scale[:, some] = _as_float16(scale * (above / constant[some])[:, None])
+        _check_stored(found.scale[:, some], scale, nodes, posed)
+        wanted = local[some][..., 3] * above[:, None, None]
+        shifts = wanted if is_root else _corrected(wanted, exact[some][..., 3], stored[parents])
+        found.translation[:, some] = shifts.swapaxes(0, 1)
+        parts = (found.translation[:, some], found.rotation[:, some], found.scale[:, some])
+        own = matrix.from_trs(*(each.astype(np.float64).swapaxes(0, 1) for each in parts))
+        stored[some] = own if is_root else matrix.multiply(stored[parents], own)
     return found
+
+
+def _blocks_by_depth(parents: Ints) -> Iterator[Ints]:
+    """Yield joints of one depth, MAX_BLOCK_JOINTS at most, those above others first. parents: (J,), before children."""
+    depths = np.zeros(len(parents), np.int64)
+    for i, parent in enumerate(parents.tolist()):
+        depths[i] = depths[parent] + 1 if parent >= 0 else 0
+    order = np.argsort(depths, kind="stable")
+    for level in np.split(order, np.flatnonzero(np.diff(depths[order])) + 1):
+        yield from (level[k : k + MAX_BLOCK_JOINTS] for k in range(0, len(level), MAX_BLOCK_JOINTS))
 
 
 def _as_float16(scale: Floats) -> AnyArray:
@@ -142,15 +157,15 @@ def _as_float16(scale: Floats) -> AnyArray:
         return scale.astype(np.float16)
 
 
-def _check_stored(stored: AnyArray, scale: Floats, node: int, posed: PosedSkeleton) -> None:
-    """Raise UnsupportedError unless the stored scales (F, 3) are finite: programs show nothing of infinite ones."""
+def _check_stored(stored: AnyArray, scale: Floats, nodes: Sequence[int], posed: PosedSkeleton) -> None:
+    """Raise UnsupportedError unless the stored scales (F, L, 3) are finite: programs show nothing of infinite ones."""
     beyond = ~np.isfinite(stored)
     if not beyond.any():
         return
-    frame, axis = np.argwhere(beyond)[0].tolist()
-    name = posed.skeleton.display_name(node)
+    joint, frame, axis = np.argwhere(beyond.swapaxes(0, 1))[0].tolist()
+    name = posed.skeleton.display_name(nodes[joint])
     raise UnsupportedError(
-        f"joint '{name}' has a scale of {scale[frame, axis]:g} at {posed.times[frame]:g} s, "
+        f"joint '{name}' has a scale of {scale[frame, joint, axis]:g} at {posed.times[frame]:g} s, "
         f"and USD stores scales of joints as float16, up to {MAX_FLOAT16:g}"
     )
 
@@ -166,18 +181,19 @@ def _local_matrices(group: SkeletonGroup, posed: PosedSkeleton) -> Floats:
     return found
 
 
-def _rotation_and_scale(node: int, posed: PosedSkeleton) -> tuple[Floats, Floats]:
-    """Rotations (F, 4), each on the side of the one before, and scales (F, 3); of a sheared matrix the nearest."""
-    sheared = np.flatnonzero(posed.skeleton.sheared == node)
-    if len(sheared):
-        _, rotation, scale, _ = matrix.decompose(posed.skeleton.sheared_local[sheared[0]])
-        frames = len(posed.times)
-        return np.tile(rotation, (frames, 1)), np.tile(scale, (frames, 1))
-    return quaternion.align_signs(posed.pose.rotation[:, node]), posed.pose.scale[:, node]
+def _rotations_and_scales(nodes: Sequence[int], posed: PosedSkeleton) -> tuple[Floats, Floats]:
+    """Rotations (F, L, 4), each on the side of the one before, and scales (F, L, 3), of sheared ones the nearest."""
+    rotations = quaternion.align_signs(posed.pose.rotation[:, nodes])
+    scales = np.array(posed.pose.scale[:, nodes])
+    numbers = {node: i for i, node in enumerate(nodes)}
+    for node, whole in zip(posed.skeleton.sheared.tolist(), posed.skeleton.sheared_local, strict=True):
+        if node in numbers:
+            _, rotations[:, numbers[node]], scales[:, numbers[node]], _ = matrix.decompose(whole)
+    return rotations, scales
 
 
 def _corrected(wanted: Floats, position: Floats, parent: Floats) -> Floats:
-    """Translations (F, 3) that place a joint at `position` under the parent's stored matrices (F, 3, 4).
+    """Translations (..., 3) that place a joint at `position` under the parent's stored matrices (..., 3, 4).
 
     Where these are flat, the translations `wanted`.
     """

@@ -109,13 +109,18 @@ def external_uri(image: Json) -> str:
 def find_image(folder: Path | None, image: Json) -> Path | None:
     """Return the file of an external image; None for others, for no image, or if it can't be read."""
     file = locate_image(folder, image)
-    if file is None or not _is_image_name(uri.relative_path(image["uri"])):
-        return None
+    return file if file is not None and is_image(file, image) else None
+
+
+def is_image(file: Path, image: Json) -> bool:
+    """Return whether the file that an external image names is an image, by its name and its first bytes."""
+    if not _is_image_name(uri.relative_path(image["uri"])):
+        return False
     try:
         with open_regular(file) as opened:
-            return file if media_type(opened.read(HEAD_BYTES)) else None
+            return bool(media_type(opened.read(HEAD_BYTES)))
     except OSError:
-        return None
+        return False
 
 
 def locate_image(folder: Path | None, image: Json) -> Path | None:
@@ -124,7 +129,10 @@ def locate_image(folder: Path | None, image: Json) -> Path | None:
     if not address or folder is None:
         return None
     try:
-        return resolver.locate(folder, uri.relative_path(address))
+        path = uri.relative_path(address)
+        if not os.path.lexists(folder / path):  # before links are resolved, which takes ten times as long
+            return None
+        return resolver.locate(folder, path)
     except FormatError:
         return None
 

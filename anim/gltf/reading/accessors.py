@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from anim.arrays import Floats, Ints, freeze, is_finite
 from anim.errors import AnimError, FormatError, UnsupportedError
 from anim.gltf.document import Buffer, Bytes, Document, Json, json_array
+from anim.gltf.reading.overlaps import unbacked_bytes
 from anim.gltf.validation import buffer_layout
 from anim.memory import MemoryBudget
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOAT = 5126
 FLOAT_VECTORS = {(FLOAT, "SCALAR"): 1, (FLOAT, "VEC2"): 2, (FLOAT, "VEC3"): 3, (FLOAT, "VEC4"): 4}  # components
+BYTES_PER_UNBACKED_BYTE = 32  # of memory; work on as many keys takes seconds
 T = TypeVar("T")
 
 
@@ -48,6 +50,20 @@ class Accessors:
         extended = [view for view in map(self._views.__getitem__, views) if "extensions" in view]
         packed = filter(None, map(buffer_layout.compression, extended))
         self.budget.check(total + sum(each["count"] * each["byteStride"] for each in packed))
+
+    def check_keys(self, indices: Iterable[int]) -> None:
+        """Raise UnsupportedError as `check_total`, and if keys that no bytes of their own back would take too much.
+
+        Those are of accessors that overlap, or have no data: they count with the copies that commands work on. Files
+        that tools export have none, and their keys are as many as their bytes.
+        """
+        chosen = set(indices) - self._given.keys()
+        self.check_total(chosen)
+        described = [self._accessors[i] for i in chosen]
+        self.budget.check(
+            BYTES_PER_UNBACKED_BYTE * unbacked_bytes(described, self._views, self._document.buffers),
+            "keys of accessors that overlap, or have no data,",
+        )
 
     def about(self, index: int) -> Json:
         """Return the JSON of an accessor."""

@@ -11,7 +11,8 @@ from anim.errors import AnimError, FormatError, ShapeError, UnsupportedError
 from anim.gltf.document import Document, Json, json_array
 from anim.gltf.reading import animations, node_matrix
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.meshes import BYTES_PER_POSED_VERTEX, Meshes
+from anim.gltf.reading.meshes import BYTES_PER_MORPH, BYTES_PER_POSED_VERTEX, Meshes
+from anim.gltf.reading.repeated_keys import BYTES_PER_INSPECTED_KEY, check_repeated_keys
 from anim.gltf.reading.scene_nodes import check_not_required, depth_first
 from anim.gltf.validation import hierarchy
 from anim.model import Clip, MeshInstance, MorphedNode, Scene, Skeleton, Skin
@@ -59,10 +60,12 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     """
     _check(document)
     accessors = accessors or Accessors(document)
-    accessors.check_total(_sampled_accessors(document.json))
+    accessors.check_keys(_sampled_accessors(document.json))
     with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
         reader = animations.Reader(document, accessors)
-        return tuple(_clip(i, animation, reader) for i, animation in enumerate(json_array(document.json, "animations")))
+        found = tuple(_clip(i, each, reader) for i, each in enumerate(json_array(document.json, "animations")))
+    check_repeated_keys(found, accessors.budget)
+    return found
 
 
 def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, Clip], list[AnimError]]:
@@ -70,7 +73,7 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
     found: dict[int, Clip] = {}
     faults: list[AnimError] = []
     try:
-        accessors.check_total(_sampled_accessors(document.json))
+        accessors.check_keys(_sampled_accessors(document.json))
     except UnsupportedError as error:
         return {}, [error]
     with np.errstate(invalid="ignore"):
@@ -80,6 +83,10 @@ def readable_clips(document: Document, accessors: Accessors) -> tuple[dict[int, 
                 found[i] = _clip(i, animation, reader)
             except AnimError as error:
                 faults.append(error)
+    try:
+        check_repeated_keys(found.values(), accessors.budget, BYTES_PER_INSPECTED_KEY)
+    except UnsupportedError as error:
+        return {}, [*faults, error]
     return found, faults
 
 
@@ -124,6 +131,8 @@ def scene(
         mesh = meshes.mesh(node["mesh"], joint_count=len(skin.joints) if skin is not None else 0)
         instances.append(MeshInstance(number, mesh, skin, _weights_at_rest(node, mesh.rest_weights)))
     accessors.budget.check(BYTES_PER_POSED_VERTEX * sum(len(each.mesh.positions) for each in instances))
+    num_morphs = sum(len(each.mesh.targets) for each in instances)
+    accessors.budget.check(BYTES_PER_MORPH * num_morphs, f"{num_morphs} morph targets of all instances of meshes")
     return Scene(_skeleton(document, parents) if skeleton is None else skeleton, tuple(instances))
 
 

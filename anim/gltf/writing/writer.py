@@ -99,6 +99,7 @@ class _ContentPool:
         self._indices: dict[AccessorData, int] = {}
         self._time_axes: dict[TimeAxis, int] = {}
         self._values: dict[tuple[object, ...], int] = {}
+        self._digests: dict[tuple[int, ...], tuple[Track, bytes]] = {}  # by identity of arrays, which the tracks keep
 
     def _add(self, content: AccessorData) -> int:
         index = self._indices.get(content)
@@ -113,10 +114,17 @@ class _ContentPool:
     def values(self, track: Track) -> int:
         """The pending index of a track's values; equal values, on whatever nodes, are encoded once."""
         codes = track.codes if isinstance(track, EncodedTrack) else None
-        key = track.path, track.interpolation, track.storage, codes, track.values.shape, _value_digest(track)
+        key = track.path, track.interpolation, track.storage, codes, track.values.shape, self._digest(track)
         if key not in self._values:
             self._values[key] = self._add(encoding.values(track))
         return self._values[key]
+
+    def _digest(self, track: Track) -> bytes:
+        """Digest of a track's values; those that many tracks share are read once."""
+        arrays = id(track.values), id(track.in_tangents), id(track.out_tangents)
+        if arrays not in self._digests:
+            self._digests[arrays] = track, _value_digest(track)
+        return self._digests[arrays][1]
 
     def time_axis(self, track: Track) -> int:
         """The pending index of a track's times; those of a shared axis are encoded once."""

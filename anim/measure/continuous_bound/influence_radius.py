@@ -79,8 +79,19 @@ def join_reaches(reaches: Sequence[InfluenceRadius]) -> InfluenceRadius:
 
 
 def _morphing(part: SkinnedGroups, old: Binding, new: Binding) -> Morphing:
-    targets = np.array([_arms(part, target, old.bind, 0.0) for target in part.surface.targets])
+    if part.surface.is_rigid:  # of thousands of nodes with one mesh, in one call for all targets
+        targets = np.array([_longest(part.surface.targets, old.bind[0, :, :3])]).T
+    else:
+        targets = np.array([_arms(part, target, old.bind, 0.0) for target in part.surface.targets])
     return Morphing((old.owner, new.owner), np.array([old.rest_weights, new.rest_weights]), targets.T)
+
+
+def _longest(targets: Floats, linear: Floats) -> Floats:
+    """The longest direction (M,) of each target (M, V, 3), in the space to which a matrix (3, 3) leads."""
+    if (linear == np.eye(3)).all():
+        return np.asarray(np.sqrt((targets * targets).sum(axis=2)).max(axis=1, initial=0.0))
+    moved = np.einsum("ij,mvj->mvi", linear, targets)
+    return np.asarray(np.sqrt((moved * moved).sum(axis=2)).max(axis=1, initial=0.0))
 
 
 def _arms(part: SkinnedGroups, points: Floats, bind: Floats, one: float) -> Floats:

@@ -19,10 +19,18 @@ def are_moving(tracks: Sequence[Track]) -> Bools:
 
     Signs of rotations don't count, except under CUBICSPLINE, where they affect the interpolation.
     """
-    result = np.zeros(len(tracks), np.bool_)
-    for group in concatenate(tracks):
+    distinct: dict[object, int] = {}  # of tracks that share their keys, as those of copied clips, one counts for all
+    rows = [distinct.setdefault(_shared_keys(track), len(distinct)) for track in tracks]
+    chosen = dict(zip(rows, tracks, strict=True))
+    result = np.zeros(len(chosen), np.bool_)
+    for group in concatenate([chosen[row] for row in range(len(chosen))]):
         result[group.numbers] = _is_moving(group)
-    return result
+    return result[np.array(rows, np.int64)]
+
+
+def _shared_keys(track: Track) -> object:
+    """The same for tracks that differ in no more than their node: `are_moving` is then the same."""
+    return track.kind, track.interpolation, *map(id, (track.values, track.in_tangents, track.out_tangents))
 
 
 def _is_moving(group: ConcatenatedTracks) -> Bools:

@@ -31,11 +31,16 @@ def read(extension: Any, json: Json) -> SpringBones:
     ends = np.cumsum([0, *(len(group.get("colliders", [])) for group in animation.get("colliderGroups", []))]).tolist()
     groups = [range(*each) for each in pairwise(ends)]
     joints = JointSprings(nodes)
-    chains = []
+    branches = [
+        [
+            _nodes_below(root, nodes, joints, f"boneGroups[{i}].bones[{k}]")
+            for k, root in enumerate(group.get("bones", []))
+        ]
+        for i, group in enumerate(animation.get("boneGroups", []))
+    ]
+    chains: list[SpringChain] = []
     for i, group in enumerate(animation.get("boneGroups", [])):
-        for k, root in enumerate(group.get("bones", [])):
-            below = _nodes_below(root, nodes, joints, f"boneGroups[{i}].bones[{k}]")
-            chains.append(locate(f"boneGroups[{i}]", _chain, group, below, nodes, groups))
+        chains += locate(f"boneGroups[{i}]", _chains, group, branches[i], nodes, groups)
     return SpringBones(tuple(chains), colliders)
 
 
@@ -66,7 +71,10 @@ def _nodes_below(root: int, nodes: list[Json], joints: JointSprings, spring: str
     return found
 
 
-def _chain(group: Json, below: list[int], nodes: list[Json], groups: list[range]) -> SpringChain:
+def _chains(group: Json, branches: list[list[int]], nodes: list[Json], groups: list[range]) -> list[SpringChain]:
+    """The chains of a group's bones, which share its parameters and its colliders."""
+    if not branches:
+        return []
     direction, power = _vector(group.get("gravityDir", {"y": -1.0})), group.get("gravityPower", 0.0)
     parameters = SpringParameters(
         stiffness=group.get("stiffiness", DEFAULT_STIFFNESS),
@@ -74,15 +82,26 @@ def _chain(group: Json, below: list[int], nodes: list[Json], groups: list[range]
         gravity=(power * direction[0], power * direction[1], power * direction[2]),
         hit_radius=group.get("hitRadius", DEFAULT_HIT_RADIUS_M),
     )
-    joints: list[SpringJoint] = []
+    colliders = tuple(index for each in dict.fromkeys(group.get("colliderGroups", [])) for index in groups[each])
+    center = group.get("center", -1)
+    return [
+        SpringChain(
+            group.get("comment", "") or nodes[below[0]].get("name", ""),
+            _joints(below, nodes, parameters),
+            colliders,
+            center if center >= 0 else None,
+        )
+        for below in branches
+    ]
+
+
+def _joints(below: list[int], nodes: list[Json], parameters: SpringParameters) -> tuple[SpringJoint, ...]:
+    joints = []
     for node in below:
         children = nodes[node].get("children", [])
         tail = children[0] if children else None
         joints.append(SpringJoint(node, tail, parameters, (0.0, 0.0, 0.0) if children else _last_tail(nodes[node])))
-    colliders = [index for each in dict.fromkeys(group.get("colliderGroups", [])) for index in groups[each]]
-    center = group.get("center", -1)
-    name = group.get("comment", "") or nodes[below[0]].get("name", "")
-    return SpringChain(name, tuple(joints), tuple(colliders), center if center >= 0 else None)
+    return tuple(joints)
 
 
 def _last_tail(node: Json) -> Vector:

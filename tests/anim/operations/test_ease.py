@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from anim.operations.ease import Tolerances, ease
 from anim.sampling.track import sample
 from tests import clips
 from tests.anim.operations.plain_eases import EASES, Ease, elastic_out
+from tests.calls import count_calls
 from tests.clips import CUBICSPLINE, STEP
 from tests.files import mark_slow
 
@@ -190,3 +193,14 @@ def test_fewest_pieces_of_a_hard_ease() -> None:
     one = clips.track("translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
     counts = {name: len(eased(one, name).times) - 1 for name in limits}
     assert all(counts[name] <= limits[name] for name in limits), counts
+
+
+def test_long_tracks_that_share_keys_are_eased_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    times, values = np.arange(5000) / 30, np.random.default_rng(3).normal(size=(5000, 3))
+    one, other = (Track(0, "translation", "LINEAR", times, each) for each in (values, values + 1))
+    counted = count_calls(monkeypatch, importlib.import_module("anim.operations.ease"), "ease_segments")
+    found = ease(Clip("", (one, one.on_node(1), replace(other, node=2))), easing="ease-in").tracks
+    assert len(counted) == 2
+    assert found[1].values is found[0].values
+    assert found[1] == replace(ease(Clip("", (one,)), easing="ease-in").tracks[0], node=1)
+    assert found[2] == replace(ease(Clip("", (other,)), easing="ease-in").tracks[0], node=2)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from anim.files import atomic
+from anim.files import atomic, resolver
 from anim.gltf.io import images
 from anim.gltf.io.source import open_file, write_file
+from tests.calls import count_calls
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
 
@@ -58,3 +59,13 @@ def test_an_image_whose_name_another_process_takes_meanwhile_gets_another_one(
     assert (out / image["uri"]).read_bytes() == PNG
     assert (out / "skin.png").read_bytes() == other
     assert len(list(out.iterdir())) == 3
+
+
+def test_links_are_resolved_only_of_images_that_are_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "there.png").write_bytes(PNG)
+    (tmp_path / "dangling.png").symlink_to(tmp_path / "nowhere.png")
+    counted = count_calls(monkeypatch, resolver, "locate")
+    names = [*(f"{i}.png" for i in range(100)), "there.png", "dangling.png", "../there.png", "a%00.png"]
+    found = [images.locate_image(tmp_path, {"uri": name}) for name in names]
+    assert [each for each in found if each is not None] == [tmp_path / "there.png"]
+    assert len(counted) == 2

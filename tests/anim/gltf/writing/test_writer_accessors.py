@@ -16,6 +16,7 @@ from anim.gltf.writing import writer
 from anim.model import Clip
 from fixtures.broken.pieces import animated, text
 from tests.anim.gltf.writing.documents import rewritten, viewed
+from tests.calls import count_calls
 from tests.clips import track
 from tests.files import opened
 
@@ -94,3 +95,17 @@ def test_names_of_accessors_go_where_two_become_one() -> None:
     after = rewritten(document)
     assert len(after.json["accessors"]) == 2
     assert not any("name" in each for each in after.json["accessors"])
+
+
+def test_keys_that_many_tracks_share_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = animated()
+    content["nodes"] = [{}] * 3
+    content["scenes"] = [{"nodes": [0, 1, 2]}]
+    one, other = (track("translation", [0.0, 2.0], [[7, 7, x], [8, 8, 8]]) for x in (7, 6))
+    new = Clip("walk", (one, one.on_node(1), other.on_node(2)))
+    counted = count_calls(monkeypatch, writer, "_value_digest")
+    after = writer.replace_clips(opened(text(content)), {0: new})
+    assert len(counted) == 2
+    assert [each.values.tolist() for each in reader.clips(after)[0].tracks] == [
+        each.values.tolist() for each in new.tracks
+    ]

@@ -42,3 +42,9 @@ def test_changes_count_by_the_size_of_the_values() -> None:
 def test_many_tracks_are_as_each_alone() -> None:
     tracks = [*TRACKS.values(), *TRACKS.values()]
     assert are_moving(tracks).tolist() == [bool(are_moving([each])[0]) for each in tracks]
+
+
+def test_tracks_that_share_keys_move_alike() -> None:
+    moving, still = clips.track("scale", [0, 1], [[1, 1, 1], [2, 1, 1]]), clips.track("scale", [0, 1], np.ones((2, 3)))
+    tracks = [moving, still, moving.on_node(4), still.on_node(5), moving.on_node(6)]
+    assert are_moving(tracks).tolist() == [True, False, True, False, True]

@@ -196,6 +196,11 @@ def test_an_invalid_vrm_0_file_is_refused(group: dict[str, Any], words: str) -> 
             r"springs\[1\]: node 0 'a' is a joint of springs\[0\] too",
         ),
         (
+            "VRM",
+            {"secondaryAnimation": {"boneGroups": [{"bones": [0]}] * 1000}},
+            r"boneGroups\[1\].bones\[0\]: node 0 'a' is a joint of boneGroups\[0\].bones\[0\] too",
+        ),
+        (
             SPRINGS,
             {"specVersion": "1.0", "springs": [{"joints": [{"node": 0}, {"node": 0}, {"node": 1}]}]},
             r"springs\[0\]: node 0 'a' is a joint twice",
@@ -229,6 +234,14 @@ def test_groups_of_colliders_named_twice_count_once() -> None:
     colliders = [{"node": 2, "colliders": [{}, {}]}, {"node": 2, "colliders": [{}]}]
     about = {"boneGroups": [{"bones": [0], "colliderGroups": [1, 0] * 10**4}], "colliderGroups": colliders}
     assert stated("VRM", {"secondaryAnimation": about}).chains[0].colliders == (2, 0, 1)
+
+
+def test_chains_of_one_group_share_its_colliders() -> None:
+    group = {"bones": [1, 2], "colliderGroups": [0], "comment": "tail"}
+    about = {"boneGroups": [group], "colliderGroups": [{"node": 0, "colliders": [{}] * 300}]}
+    one, other = stated("VRM", {"secondaryAnimation": about}, [{}, {}, {}]).chains
+    assert one.colliders is other.colliders
+    assert (one.name, one.joints[0].node, other.joints[0].node, len(one.colliders)) == ("tail", 1, 2, 300)
 
 
 @pytest.mark.parametrize("extension", [3, {}, {"secondaryAnimation": None}, {"secondaryAnimation": {}}])
