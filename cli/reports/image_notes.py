@@ -10,7 +10,7 @@ from anim.errors import FormatError
 from anim.files import resolver
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import uri
-from anim.gltf.io.images import external_uri, is_image, locate_image
+from anim.gltf.io.images import external_uri, find_image, is_image, locate_image
 from anim.gltf.io.source import Source
 from anim.units import plural
 from cli.io import command_files, documents
