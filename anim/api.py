@@ -226,7 +226,8 @@ def diff(
     chosen = match_names(globs, old.clips.names, "clip") if globs else None
     before, after = tuple(old.clips), tuple(new.clips)
     metric = ErrorMetric(old.scene, new.scene, clips=before + after)
-    return compare.diff(metric, before, after, chosen=chosen, player=player, fps=fps)
+    documents = old.document.json, new.document.json
+    return compare.diff(metric, before, after, chosen=chosen, player=player, fps=fps, documents=documents)
 
 
 def sample(asset: AssetLike, clip: ClipKey = 0, *, fps: float | None = None, times: ArrayLike | None = None) -> Floats:

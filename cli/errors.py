@@ -41,11 +41,18 @@ class UsageError(AnimError):
     """The command line is invalid: exit 2."""
 
 
+class RefusedOutputError(UsageError):
+    """An output can't be made at its place, or would replace what the command reads or writes: exit 2.
+
+    Of many files, the others are made.
+    """
+
+
 class CheckError(AnimError):
     """A requested check failed: exit 6."""
 
 
-CODES[UsageError] = USAGE
+CODES[UsageError] = CODES[RefusedOutputError] = USAGE
 CODES[CheckError] = CHECK
 
 

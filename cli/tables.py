@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 
 MAX_QUOTED_LENGTH = 300  # characters of a problem, or of its position: names in a file can have any length
+MAX_WORD_LENGTH = 40  # characters of a word that is left out whole where a text is cut
 Cell = str | int | float | bool | None
 
 
@@ -44,11 +45,19 @@ def escape_control(words: str) -> str:
 
 
 def cut_middle(words: str, length: int = MAX_QUOTED_LENGTH) -> str:
-    """Return text of at most `length` characters, with "…" in the middle if it was longer."""
+    """Return text of at most `length` characters, with "…" in the middle if it was longer.
+
+    It is cut between words, unless a word there is longer than MAX_WORD_LENGTH.
+    """
     if len(words) <= length:
         return words
     end = length // 3
-    return f"{words[: length - end - 1]}…{words[-end:]}"
+    head, tail = words[: length - end - 1], words[-end:]
+    if (last := head.rfind(" ", -MAX_WORD_LENGTH)) >= 0:
+        head = head[: last + 1]
+    if (first := tail.find(" ", 0, MAX_WORD_LENGTH)) >= 0:
+        tail = tail[first:]
+    return f"{head}…{tail}"
 
 
 def quote(words: str, length: int = MAX_QUOTED_LENGTH) -> str:

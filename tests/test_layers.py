@@ -52,6 +52,7 @@ OPENING = {  # modules of the library that may open a path
     "anim/files/guard.py",
     "anim/files/resolver.py",
     "anim/files/special_files.py",
+    "anim/gltf/io/file_references.py",
     "anim/gltf/io/gltf_files.py",
     "anim/gltf/io/images.py",
     "anim/gltf/io/source.py",
@@ -84,11 +85,14 @@ PUBLIC = {
         "apply bind_pose ground_contact joint_matching joint_roles rest_alignment retained_tracks retarget"
     ),
     "exchange.usd_skel": "write",
-    "gltf.io": "buffers container gltf_files images json_text lenient source text_form unused_buffers uri",
+    "gltf.io": (
+        "buffers container file_references gltf_files images json_text lenient source text_form unused_buffers uri"
+    ),
     "gltf.meshopt": "codec storage",
     "gltf.reading": "accessors materials meshes reader scene_nodes vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets extensions hierarchy rules schema",
-    "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal writer",
+    "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal unknown_extensions "
+    "writer",
     "measure.compare": "diff equal_scenes name_matching vertex_distance",
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "clip_groups largest_error prover sampled_clips",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from anim.gltf.reading import reader
 from anim.measure.inspect.report import ClipReport
+from anim.measure.loops.recommendations import blend_option
 
 MIN_REGULAR_FRACTION = 0.9  # fraction of keys on the grid below which a frame rate is not reliable
 MAX_IRREGULAR_FPS = 60.0  # advised where keys are on no frame grid; the spacing of the closest ones says little
@@ -16,13 +17,15 @@ DEFAULT_FPS = 60.0  # advised for clips without a frame rate of their own
 def clip_advice(advice: str, clips: Sequence[ClipReport], numbers: Sequence[int]) -> str:
     """Return advice for the clips at some indices.
 
-    {fps} becomes their frame rate, {finer} twice that, and {clips} the options that select them.
+    {fps} becomes their frame rate, {finer} twice that, {blend} the option for the time over which `loop` closes them,
+    and {clips} the options that select them.
     """
     if "{" not in advice:
         return advice
     by_number = {clip.index: clip for clip in clips}
-    fps = frame_rate([by_number[i] for i in numbers])
-    return advice.format(fps=fps, finer=2 * fps, clips=reader.choose_option(numbers))
+    chosen = [by_number[i] for i in numbers]
+    fps, blend = frame_rate(chosen), blend_option([clip.duration_s for clip in chosen])
+    return advice.format(fps=fps, finer=2 * fps, blend=blend, clips=reader.choose_option(numbers))
 
 
 def frame_rate(clips: Sequence[ClipReport]) -> int:

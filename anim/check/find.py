@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from operator import attrgetter
 
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Finding, Occurrence
@@ -26,13 +28,18 @@ def group_occurrences(
 ) -> list[tuple[Finding, Sequence[Occurrence]]]:
     """Return one finding per rule that can sum up occurrences, else per occurrence, each with its occurrences.
 
-    Costly rules are left out.
+    Occurrences with advice of their own are summed up with those of the same advice only. Costly rules are left out.
     """
     result: list[tuple[Finding, Sequence[Occurrence]]] = []
     for rule, found in occurrences(file, selection, costly=False):
-        parts: Sequence[Sequence[Occurrence]] = [found] if rule.problem is not None else [[each] for each in found]
+        parts = [[each] for each in found] if rule.problem is None else _by_advice(found)
         result += ((rule.finding(part, file.facts.clips, selection.severity(rule)), part) for part in parts)
     return result
+
+
+def _by_advice(found: Sequence[Occurrence]) -> list[list[Occurrence]]:
+    advice = attrgetter("advice")
+    return [list(some) for _, some in groupby(sorted(found, key=advice), advice)]
 
 
 def occurrences(

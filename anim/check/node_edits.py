@@ -6,6 +6,7 @@ from typing import Any
 
 from anim.gltf.document import Json, json_array
 from anim.gltf.validation.channel_targets import EXTENSION, Target, channel_target
+from anim.gltf.writing.unknown_extensions import possible_nodes
 from anim.model import parse_weight_pointer
 
 TRANSFORM = ("translation", "rotation", "scale", "matrix")
@@ -15,13 +16,16 @@ MESH = ("mesh", "skin", "weights")
 def move_mesh_to_root(json: Json, number: int) -> bool:
     """Make a skinned mesh a root node without transform, in place; return False if that could change more.
 
-    A node that other nodes or tracks need keeps its position; its mesh then moves to a new node.
+    A node that other nodes or tracks need keeps its position; its mesh then moves to a new node, unless an extension
+    may name the old one for its mesh, such as the expressions of VRM.
     """
     nodes = json_array(json, "nodes")
     scenes = [i for i, scene in enumerate(json_array(json, "scenes")) if number in _reachable(nodes, scene)]
     if _is_extended(json, number):
         return False
     if _is_needed(json, number):
+        if number in possible_nodes(json):
+            return False
         number = _split(json, number)
     else:
         _detach(json, number)

@@ -61,8 +61,9 @@ class Rule(NamedTuple):
 
     code: stable; its first digit is the group. about: one line. why: evidence, and who is hurt. find: occurrences in a
     file. problem: text on several occurrences, which `inspect` lists as one finding; None: each has its own text.
-    advice: the remedy, with {fps}, {finer} and {clips} for a command on these clips (see `advice.clip_advice`), or ""
-    if each occurrence has its own. is_default: False for rules that only `--select` turns on.
+    advice: the remedy, with {fps}, {finer}, {blend} and {clips} for a command on these clips (see
+    `advice.clip_advice`), or "" if each occurrence has its own.
+    is_default: False for rules that only `--select` turns on.
     is_costly: True for rules that sample whole clips; `inspect` leaves them to `check`.
     targets: severities for players named by `--target`. texts: parameters that are regular expressions.
     """

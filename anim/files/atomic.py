@@ -84,11 +84,13 @@ class AtomicOutputs:
     """Files of one folder, `main` and its companions, that are renamed together on `commit`.
 
     folder and main: with links resolved. A companion that is a link is replaced: its target belongs to others.
+    suffix: of the name by which `main` is written, which can be a link's; None for its own.
     """
 
     folder: Path
     main: str
     files: dict[str, Path] = field(default_factory=dict)
+    suffix: str | None = None
 
     def size(self, names: Sequence[str]) -> int:
         """Return the total bytes of these files."""
@@ -110,7 +112,8 @@ class AtomicOutputs:
 
     def plan(self, folder: Path) -> None:
         """Ask whether the files may be replaced; `folder` is that which they are for."""
-        guard.plan(folder / self.main, [folder / name for name in self.names if name != self.main], in_place=True)
+        companions = [folder / name for name in self.names if name != self.main]
+        guard.plan(folder / self.main, companions, in_place=True, suffix=self.suffix)
 
     def commit(self) -> None:
         """Rename the files that have new bytes; otherwise update the main file's time.

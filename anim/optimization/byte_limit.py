@@ -24,6 +24,7 @@ from anim.optimization.rate_distortion import (
     round_bound,
     smallest_bound,
 )
+from anim.optimization.stepwise_limit import StepwiseLimit, is_small
 
 USUAL_RATIO = 0.955  # bytes of animation after a longer search, as a fraction of those after a fast one
 EXPECTED_WEIGHT = 40  # clips whose sizes tell as much as the fast searches: a sample of 13 was 5-9 % too small
@@ -91,12 +92,31 @@ class ByteLimit:
         if is_output_of(file.document, file.clips, named, file.chosen):
             return named, Optimized(file.document, {}, {}, unchanged=True)
         bound = smallest_bound(self._max_bytes, file.scale, self._fast.measure, ratio=self._usual_ratio)
-        found = self._find_fitting(self._most if bound is None else min(bound, self._most))
+        likely = self._most if bound is None else min(bound, self._most)
+        found = self._find_at_steps(likely) if likely and file.scale and is_small(file, self._fast) else []
+        if not any(map(self._fits, found)):
+            found += self._find_fitting(likely)
         best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
         if best is None:
             smallest = min((*(each.point for each in found), self._fast.measure(0.0)), key=lambda point: point.size)
             raise ByteLimitError(self._max_bytes, smallest, self._most)
         return self._request.with_bound(best.point.max_error), best.optimized
+
+    def _find_at_steps(self, likely: float) -> list[_Result]:
+        """Results of verified searches at bounds around the likely one, m, and of the best result of each clip."""
+        found: list[_Result] = []
+
+        def search(bound: float) -> tuple[Mapping[int, ClipResult], Mapping[int, float]]:
+            request = self._request.with_bound(bound)
+            results = self._file.search(request, self._fast.clips)
+            return results, estimate_sizes(results, request)
+
+        def write(results: Mapping[int, ClipResult], bound: float) -> int:
+            found.append(self._write_results(results, bound, bound))
+            return found[-1].point.size
+
+        StepwiseLimit(self._max_bytes, self._file.scale, self._most, search, write).run(likely)
+        return found
 
     def _find_fitting(self, bound: float) -> list[_Result]:
         """Results of verified searches: at larger bounds until one fits, then at smaller ones while bytes are unused.

@@ -189,10 +189,8 @@ class _TrackSorter:
         bound = fraction * self._task.bound / max(len(weights), 1)
         for i in weights:
             track = self._clip.tracks[i]
-            reach = context.track_reach(track)
-            kept = context.policy.keep.intersection(moved_nodes(context.skeleton, track))
-            exact = context.bounds.max_error == 0 or bool(kept)
-            if exact or not reach.size or track.interpolation in self._kept:
+            reach = self._weight_reach(track, bound)
+            if not reach.size:
                 self._keep_track(i, key_reduction.reduce_lossless(track))
                 continue
             if track.node is not None and not has_pointers and self._is_droppable(i):
@@ -209,6 +207,18 @@ class _TrackSorter:
                 continue
             self._done[i] = new, stored
             self._spent += error
+
+    def _weight_reach(self, track: Track, bound: float) -> Floats:
+        """The displacement of vertices by weights that may change by at most `bound`, m; empty for an exact track.
+
+        Weights that move no vertex have a vertex each, by which they stay within the bound of tracks without a node.
+        """
+        context = self._context
+        reach, fraction = context.track_reach(track), context.bounds.max_pointer_error
+        exact = bound <= 0 or track.interpolation in self._kept or (fraction <= 0 and not reach.any(axis=1).all())
+        if exact or not reach.size or context.policy.keep.intersection(moved_nodes(context.skeleton, track)):
+            return np.zeros((0, 0))
+        return morph_weights.bound_still_weights(track, reach, bound, fraction) if fraction > 0 else reach
 
     def _spline_is_smaller(self, i: int, lines: Track, found: Mapping[int, tuple[Track, EncodedKeys]]) -> bool:
         """Return whether the source's spline takes fewer bytes than lines, each with its part of a time axis."""

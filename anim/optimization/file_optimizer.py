@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
@@ -102,5 +102,5 @@ class FileOptimizer:
         return RatePoint(max_error, size, error, animation_bytes(document))
 
     def find_point(self, request: Request, max_error: float) -> RatePoint:
-        """Return the rate-distortion point of a bound, in m, by a fast search."""
-        return self.measure_point(max_error, self.run(replace(request.with_bound(max_error), effort=FAST)))
+        """Return the rate-distortion point of a bound, in m."""
+        return self.measure_point(max_error, self.run(request.with_bound(max_error)))

@@ -106,8 +106,8 @@ def _convert(input: str, output: str, *, embed: bool, dry_run: bool, reporter: t
             document = container.embed_buffers(images.embed(document, source.folder))
         size = documents.write(document, output, source, dry_run=dry_run, reporter=reporter)
     if not dry_run and (embed or output == documents.PIPE or not source.is_in_folder(output)):
-        copied = output != documents.PIPE
-        for note in image_notes.notes(document, source.folder, copied=copied, embed_hint="--embed takes them in"):
+        image_notes.warn_of_pipe(document, source.folder, output, reporter)
+        for note in image_notes.notes(document, source.folder, image_notes.copied_names(output)):
             reporter.info(note)
     name = source.name if output == documents.PIPE else output
     reporter.info(

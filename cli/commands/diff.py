@@ -53,7 +53,8 @@ def command(
         typer.Option(
             "--fail-above",
             metavar="LENGTH",
-            help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the model's size; 0: no error.",
+            help="Maximum error, above it exit 6: 0.5mm, or 0.1% of the model's size; 0: no error, also of "
+            "weights and pointers.",
         ),
     ] = None,
     player: Annotated[
@@ -147,7 +148,8 @@ def command(
     ruler = ErrorMetric(one.scene, other.scene, shell=radius or None, clips=(*one.clips, *other.clips))
     chosen = selection.chosen_clips(one.file.clips) if clip else None
     try:
-        found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps)
+        jsons = one.document.json, other.document.json
+        found = compared(ruler, one.clips, other.clips, chosen=chosen, player=who, fps=fps, documents=jsons)
     except AnimError as error:
         raise error.at(one.file.name, ": ") from None
     alone = None
@@ -246,7 +248,10 @@ def _players(new: str | None, player: str, players: str | None) -> str:
 
 
 def _check(found: DiffReport, limit: float) -> None:
-    """Raise CheckError if an error exceeds `limit` m, a clip is missing, or nothing was compared."""
+    """Raise CheckError if an error exceeds `limit` m, a clip is missing, or nothing was compared.
+
+    With a limit of 0 also for any error of morph weights or pointers, which have no length, and for those not measured.
+    """
     if found.diff.missing_clips:
         number = found.diff.missing_clips[0]
         raise CheckError(f"{found.new.name}: {reader.clip_label(found.old.clips[number], number)} is missing")
@@ -256,3 +261,5 @@ def _check(found: DiffReport, limit: float) -> None:
     if above:
         more = f" and {len(above) - 1} more" if len(above) > 1 else ""
         raise CheckError(f"{found.new.name}: {diff_report.worst(found)}{more} (limit {format_length(limit)})")
+    if not limit and (words := diff_report.without_length(found)):
+        raise CheckError(f"{found.new.name}: {words} (limit 0 mm)")

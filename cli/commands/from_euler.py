@@ -32,7 +32,7 @@ from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
 from cli.options.common import Format
-from cli.reports import from_euler_report
+from cli.reports import from_euler_report, image_notes
 from cli.reports.from_euler_report import ConversionReport
 from cli.workflows.character import CharacterOptions, check_name, index_of, named, pairs, put_on_character
 
@@ -162,6 +162,8 @@ def command(
             made, document = put_on_character(made, character, casting, reporter)
             before = character.size
             size = _write(made, document, output, character, format, reporter, dry_run=dry_run)
+        if not dry_run:
+            image_notes.report(document, character, output, reporter)
     for line in from_euler_report.lines(made, verbose=verbose):
         reporter.info(line)
     parts = [

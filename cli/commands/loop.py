@@ -19,7 +19,7 @@ from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene
 from anim.operations.close_loop import close_loop
 from anim.operations.selection import Selection
-from anim.units import list_some
+from anim.units import list_some, plural
 from cli import tables
 from cli.errors import UsageError
 from cli.io import documents, scenes
@@ -33,6 +33,7 @@ from cli.workflows.edit_clips import Clips, Tracks, edit_together
 SCHEMA = 1
 HELP = "--blend S closes the loop over the last S seconds; --clip selects clips"
 MAX_LISTED_JOINTS = 3  # joints that a table or a message lists
+MAX_LISTED_PROBLEMS = 3  # clips that can't be closed in a message; with more it would be cut
 
 
 def command(
@@ -101,7 +102,7 @@ def command(
 class _Closing:
     """Closes clips, all analyzed together. blend: s, None to add a missing frame only. path: of the input.
 
-    Clips that can't be closed are collected, so that one error names all of them before anything is written.
+    Clips that can't be closed are collected, so that one error names them before anything is written.
     """
 
     def __init__(self, blend: float | None, path: str) -> None:
@@ -137,9 +138,11 @@ class _Closing:
             raise error.at(reader.clip_label(clip.name, number)) from None
 
     def notes(self, before: Mapping[int, Clip], after: Mapping[int, Clip]) -> Iterator[str]:
-        """Yield notes on unchanged clips. Raises UsageError that names every clip that can't be closed."""
+        """Yield notes on unchanged clips. Raises UsageError that names clips that can't be closed."""
         if self._problems:
-            raise UsageError(f"{self._path}: {'; '.join(self._problems)}", help=HELP)
+            more = len(self._problems) - MAX_LISTED_PROBLEMS
+            listed = self._problems[:MAX_LISTED_PROBLEMS] + ([f"and {plural(more, 'clip')} more"] if more > 0 else [])
+            raise UsageError(f"{self._path}: {'; '.join(listed)}", help=HELP)
         if self._poses:
             yield f"a single pose, without a loop to close: {list_some(self._poses)}"
 

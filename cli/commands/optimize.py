@@ -43,7 +43,7 @@ class Player(StrEnum):
 
 
 Effort = StrEnum("Effort", [(name, name) for name in EFFORTS])  # type: ignore[misc]
-BALANCED = Effort("balanced")
+BALANCED, FAST = Effort("balanced"), Effort("fast")  # without --effort; of curves, which are many searches
 
 
 def command(
@@ -109,7 +109,7 @@ def command(
         typer.Option(
             "--max-pointer-error",
             metavar="FRACTION",
-            help="Maximum error of tracks that move no node, as a fraction of their range.",
+            help="Maximum error of tracks that move no node and weights that move no vertex, as a part of their range.",
         ),
     ] = "0.01%",
     max_angle: Annotated[
@@ -131,7 +131,14 @@ def command(
     objective: Annotated[
         Objective, typer.Option("--objective", help="Size to minimize: of the file, or of the file after gzip.")
     ] = Objective.FILE,
-    effort: Annotated[Effort, typer.Option("--effort", help="Search effort: more is smaller and slower.")] = BALANCED,
+    effort: Annotated[
+        Effort | None,
+        typer.Option(
+            "--effort",
+            help="Search effort: more is smaller and slower.  [default: balanced; with --curve fast]",
+            show_default=False,
+        ),
+    ] = None,
     workers: Annotated[
         int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Number of processes; 0: one per core.")
     ] = 0,
@@ -144,7 +151,8 @@ def command(
         typer.Option(
             "--curve",
             metavar="FILE",
-            help="Write the size of animations against error as .csv, .png or .svg, and no glTF.",
+            help="Write the size of animations against error as .csv, .png or .svg, and no glTF; with --effort "
+            "balanced the sizes that optimize reaches without an effort.",
         ),
     ] = None,
     clip: common.Clips = None,
@@ -187,7 +195,7 @@ def command(
             Policy(drop, reference, rebase_rest, drop_invisible, nodes),
             Packing.CORE if meshopt is None else Packing(meshopt.value),
             objective,
-            str(effort),
+            str(effort or (BALANCED if curve_file is None else FAST)),
             PLAYERS if player is Player.ANY else ("spec",),
             optimize_job.raw_options(bounds, lengths),
         )
@@ -211,6 +219,7 @@ def command(
             ceiling = None if max_error is None else wanted.bounds.max_error
             wanted, found = optimize_job.optimize_within(optimizer, wanted, max_count, ceiling)
             optimize_report.check(found, optimizer.clips, wanted, optimizer.scale)
+            image_notes.warn_of_pipe(source.document, source.folder, output, reporter)  # the report lists warnings
             about = optimize_outputs.describe(optimizer, wanted, found, source, output, began)
             with (
                 optimize_outputs.write_report(about, reporter, report, dry_run=dry_run),

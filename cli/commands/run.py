@@ -127,7 +127,7 @@ def command(
     except NotFoundError:  # as after all inputs were deleted
         _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
-            report_stale(record, book, (), {}, reporter, delete=delete_stale)
+            report_stale(record, book, (), {}, (), reporter, delete=delete_stale)
         raise
     if not inputs:
         _warn_of_unused(book, chosen, planned, record, reporter)
@@ -139,8 +139,7 @@ def command(
         return code
     results = caching.ResultCache(folder)
     results.prepare()
-    if record.unsaved:  # before a new journal is begun
-        record.save({})
+    record.save_unsaved()  # before a new journal is begun
     processes = jobs or os.cpu_count() or 1
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
@@ -151,9 +150,9 @@ def command(
     if not no_cache and run.counts[journals.MADE]:
         _prune(results, limit, reporter)
     if is_all:
-        report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
+        report_stale(record, book, run.jobs, run.written, run.copies, reporter, delete=delete_stale)
     else:
-        record.save(run.written)
+        record.save(run.written, run.copies)
     written = [os.path.relpath(book.folder / each) for each in run.written]
     return max(code, _check(written, quiet=quiet)) if check else code
 

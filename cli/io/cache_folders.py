@@ -7,7 +7,7 @@ import stat
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import BinaryIO
 
 import numpy as np
@@ -44,7 +44,7 @@ def outputs(path: str, away: str, *, dry_run: bool = False) -> AtomicOutputs:
     folder = Path(away) if dry_run or is_pipe else target.parent
     if not dry_run and not is_pipe:
         command_files.add_output(path)
-    return AtomicOutputs(folder, "stdout" if is_pipe else target.name)
+    return AtomicOutputs(folder, "stdout" if is_pipe else target.name, suffix=PurePath(path).suffix)
 
 
 def to_stdout(staged: AtomicOutputs) -> None:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from anim.files import guard
 from anim.files.special_files import descriptor_of, is_device_or_pipe
-from cli.errors import UsageError
+from cli.errors import RefusedOutputError, UsageError
 
 PIPE = "-"
 
@@ -29,12 +29,14 @@ class CommandFiles:
     """Files that a command reads and writes, by the names that it uses for them; what `guard` asks.
 
     before_change: called once, before any file is replaced, written directly, or given another time.
+    copies: images that were copied beside outputs, to places without such a file.
     """
 
     def __init__(self) -> None:
         self.inputs: dict[str, None] = {}  # in order
         self.outputs: dict[str, str] = {}  # files of rules, by the names of outputs
         self.before_change: Callable[[], object] | None = None
+        self.copies: list[Path] = []
         self._read: dict[str, _Input] = {}  # by place, and by the real path behind links
         self._replaced: dict[str, bool] = {}  # by place: whether it may be an input
         self._new: set[str] = set()
@@ -49,13 +51,22 @@ class CommandFiles:
                 if self._replaced.get(place) is False:
                     raise _replaces(str(path))
 
-    def plan(self, main: Path, companions: Iterable[Path] = (), *, in_place: bool = False) -> None:
-        """Add files that are replaced. Raises UsageError for an input, or another output."""
+    def plan(self, main: Path, companions: Iterable[Path] = (), *, in_place: bool = False, suffix: str) -> None:
+        """Add files that are replaced. Raises UsageError for an input, or another output.
+
+        suffix: of the name by which `main` is written: a link to an input of another format is not in its place.
+        """
         owner = {os.path.realpath(main)}
         for path in (main, *companions):
             place = _place(path)
             found = self._read.get(place)
-            if found is not None and not (in_place and found.mains == owner):
+            is_own = found is not None and found.mains == owner
+            if found is not None and is_own and in_place and path == main and not _has_suffix(suffix, found.name, main):
+                raise RefusedOutputError(
+                    f"{found.name}: is an input of another format, and would be replaced through a link "
+                    "(expected another file)"
+                )
+            if found is not None and not (in_place and is_own):
                 raise _replaces(found.name, "" if path == main else str(main))
             again = in_place and self._replaced.get(place) is True  # a product that was tried before
             if not again and (place in self._replaced or place in self._new):
@@ -68,6 +79,10 @@ class CommandFiles:
             if (place := _place(path)) in self._replaced:
                 raise _is_twice(path)
             self._new.add(place)
+
+    def add_copy(self, path: Path) -> None:
+        """Add an image that was copied."""
+        self.copies.append(path)
 
     def inputs_besides(self, main: Path) -> list[Path]:
         """Return the files that were added, without those that belong to `main` alone."""
@@ -99,6 +114,14 @@ def inputs_besides(main: Path) -> list[Path]:
     return files.inputs_besides(main) if isinstance(files, CommandFiles) else []
 
 
+def take_copies() -> list[Path]:
+    """Return the images that were copied since the last call."""
+    if not isinstance(files := guard.current(), CommandFiles):
+        return []
+    found, files.copies = files.copies, []
+    return found
+
+
 def add_output(path: str, written: str = "") -> None:
     """Record a file that was written. written: the file itself where none has the name of the output."""
     if isinstance(files := guard.current(), CommandFiles):
@@ -123,7 +146,7 @@ def check_names(outputs: Mapping[str, str], others: Iterable[Any]) -> None:
             name = first if first != option else "an input"
             raise UsageError(f"{path}: {option} would replace {name} (expected another file)")
         if path not in values and real in inputs and PurePath(real).suffix.lower() != PurePath(path).suffix.lower():
-            raise UsageError(f"{path}: is a link to an input of another format (expected another file)")
+            raise RefusedOutputError(f"{path}: is a link to an input of another format (expected another file)")
 
 
 def _place(path: Path) -> str:
@@ -131,13 +154,17 @@ def _place(path: Path) -> str:
     return os.path.normcase(os.path.join(os.path.realpath(path.parent), path.name))
 
 
-def _replaces(input: str, output: str = "") -> UsageError:
+def _has_suffix(suffix: str, *names: str | Path) -> bool:
+    return suffix.lower() in {PurePath(each).suffix.lower() for each in names}
+
+
+def _replaces(input: str, output: str = "") -> RefusedOutputError:
     if output:
-        return UsageError(
+        return RefusedOutputError(
             f"{input}: would be replaced by the file of this name beside {output}", help="choose another name for OUT"
         )
-    return UsageError(f"{input}: is an input, and would be replaced by an output (expected another file)")
+    return RefusedOutputError(f"{input}: is an input, and would be replaced by an output (expected another file)")
 
 
-def _is_twice(path: Path) -> UsageError:
-    return UsageError(f"{path}: two outputs would be written to this file (expected different files)")
+def _is_twice(path: Path) -> RefusedOutputError:
+    return RefusedOutputError(f"{path}: two outputs would be written to this file (expected different files)")

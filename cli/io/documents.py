@@ -33,7 +33,7 @@ from anim.gltf.io.source import (
 from anim.gltf.validation.extensions import PHYSICS, unknown_required
 from anim.units import list_some
 from cli import tables
-from cli.errors import UsageError
+from cli.errors import RefusedOutputError, UsageError
 from cli.io import command_files, output_names, stdout
 from cli.streams import locate, record_files, step_streams
 from cli.text import Reporter
@@ -227,9 +227,9 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
     try:
         target = resolver.resolve_links(Path(path))
         if target.is_dir():
-            raise UsageError(f"{path}: is a folder (expected a file name)")
+            raise RefusedOutputError(f"{path}: is a folder (expected a file name)")
         if path.endswith(("/", os.sep)):
-            raise UsageError(f"{path}: there is no such folder (expected a file name)")
+            raise RefusedOutputError(f"{path}: there is no such folder (expected a file name)")
         if not target.parent.is_dir():
             raise OutputError(f"{path}: there is no folder '{target.parent}'")
         if target.is_file() or not target.exists():
@@ -241,7 +241,7 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
     except PermissionError:
         raise OutputError(f"{path}: can't be written (permission denied)") from None
     except OSError as error:  # an invalid file name
-        raise UsageError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
+        raise RefusedOutputError(f"{path}: can't be written ({(error.strerror or str(error)).lower()})") from None
 
 
 def called(path: str) -> str:

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from anim.errors import RangeError
+from anim.model import Clip as DrivingClip
 from anim.simulation.integrators import INTEGRATORS
 from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
 from cli.errors import UsageError
@@ -26,6 +27,8 @@ ABOUT_INTEGRATORS = "; ".join(
     for name, each in INTEGRATORS.items()
 )
 DEFAULT_FPS = 60.0
+DEFAULT_DURATION_S = 2.0  # without a clip that has a length
+RIGID_DURATION_S = 5.0  # likewise, of rigid bodies: a pile takes longer to come to rest
 
 Clip = Annotated[
     str | None,
@@ -37,7 +40,13 @@ Step = Annotated[
 ]
 Duration = Annotated[
     float | None,
-    typer.Option("--duration", metavar="S", help="Seconds to simulate; the length of the clip without this.", min=0),
+    typer.Option(
+        "--duration",
+        metavar="S",
+        help="Seconds to simulate; without this the length of the clip, or "
+        f"{DEFAULT_DURATION_S:g} without a clip ({RIGID_DURATION_S:g} for rigid bodies).",
+        min=0,
+    ),
 ]
 WarmUp = Annotated[
     float,
@@ -101,6 +110,11 @@ Restitution = Annotated[
 ]
 Merge = Annotated[bool, typer.Option("--merge", help="Add the tracks to the driving clip, not to a new one.")]
 Name = Annotated[str, typer.Option("--name", metavar="NAME", help="Name of the new clip, and of new nodes.")]
+
+
+def chosen_duration(given: float | None, driver: DrivingClip, default: float = DEFAULT_DURATION_S) -> float:
+    """Return the seconds to simulate: as given, else the length of the driving clip, else a default."""
+    return given if given is not None else driver.end - driver.start or default
 
 
 def check_fps(fps: float) -> None:

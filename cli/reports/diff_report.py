@@ -116,6 +116,20 @@ def worst(found: DiffReport) -> str:
     return f"{format_length(error.max_error)}{percent} in '{clip}' {describe_place(error)}{vertex}, {error.time:.3f} s"
 
 
+def without_length(found: DiffReport) -> str:
+    """Return the first difference that is no distance, "" if none: "pointers 83 % of range at /… in 'Run'"."""
+    for each in found.diff.clips:
+        error, weight = each.error, each.statistics.weight
+        clip = clip_name(each.name, each.old)
+        if error.max_pointer_error:
+            return f"pointers {_share(100 * error.max_pointer_error)} % of range at {error.pointer} in '{clip}'"
+        if weight.size:
+            return f"morph weights {_share(weight.size)} at '{weight.joint}' in '{clip}'"
+        if each.unmeasured:
+            return f"{each.unmeasured[0]} is not measured in '{clip}'"
+    return ""
+
+
 def _row(each: ClipDiff, diagonal: float) -> list[tables.Cell]:
     error, found = each.error, each.statistics
     moved = bool(error.max_error)

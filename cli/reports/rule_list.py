@@ -30,7 +30,7 @@ def explain(rule: Rule) -> str:
     lines = [f"{rule.code} {rule.name}  [{level}]", "", rule.about, "", fill(rule.why, WIDTH)]
     lines += [f"With --target {target}: {severity}." for target, severity in rule.targets.items()]
     if rule.advice:
-        advice = rule.advice.format(fps="FPS", finer="FPS", clips="")
+        advice = rule.advice.format(fps="FPS", finer="FPS", blend=" --blend S", clips="")
         lines += ["", fill(f"Advice: {advice}", WIDTH)]
     if rule.fix is not None:
         lines += ["", f"Fix ({_fix(rule)}): {rule.fix.about}"]

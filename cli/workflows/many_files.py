@@ -11,8 +11,8 @@ from typing import NamedTuple
 from anim.errors import AnimError, NotFoundError, not_written
 from anim.units import plural
 from cli import errors
-from cli.errors import UsageError
-from cli.io import documents, input_files, output_names
+from cli.errors import RefusedOutputError, UsageError
+from cli.io import command_files, documents, input_files, output_names
 from cli.text import Reporter
 from cli.typer_options import name_options
 
@@ -80,11 +80,12 @@ def edit_files(
     codes = []
     for pair in pairs:
         try:
+            command_files.check_names({"OUT": pair.output}, [pair.input])
             with _make_folder(pair.output, needed=not dry_run):
                 edit(pair.input, pair.output)
-        except UsageError:  # of the options, for all files
-            raise
         except AnimError as error:
+            if isinstance(error, UsageError) and not isinstance(error, RefusedOutputError):  # of the options
+                raise
             name_options(error, {})
             codes.append(errors.report_error(error))
     if len(pairs) > 1:

@@ -27,24 +27,29 @@ def check_curve_file(path: str) -> None:
 def write_curve(
     optimizer: FileOptimizer, request: Request, path: str, name: str, reporter: Reporter, *, dry_run: bool
 ) -> None:
-    """Search with one bound after another, report each size, and write the curve. name: of the file, for the title."""
+    """Search with one bound after another, report each size, and write the curve.
+
+    request: with the effort that the sizes are of. name: of the file, for the title.
+    """
     check_diagonal(optimizer.scale)
+    reporter.info(f"  sizes of --effort {request.effort}")
     points = []
     bounds = (0.0, *ERROR_FRACTIONS, MAX_BOUND_PER_DIAGONAL)  # also the lossless and the smallest size
     for point in curve(optimizer.scale, lambda max_error: optimizer.find_point(request, max_error), bounds):
         reporter.info(_line(point, optimizer.scale))
         points.append(point)
-    made = _render(points, optimizer, PurePath(name).name, PurePath(path).suffix.lower()[1:])
+    made = _render(points, optimizer, request.effort, PurePath(name).name, PurePath(path).suffix.lower()[1:])
     if not dry_run:
         documents.write_text(made, path)
 
 
-def _render(points: Sequence[RatePoint], optimizer: FileOptimizer, title: str, kind: str) -> str | bytes:
+def _render(points: Sequence[RatePoint], optimizer: FileOptimizer, effort: str, name: str, kind: str) -> str | bytes:
     if kind == "csv":
         return _csv(points, optimizer.scale)
     from anim.show.plots.rate_distortion_plot import rate_distortion_plot
 
     source = animation_bytes(optimizer.document)
+    title = f"{name}, effort {effort}"
     return rate_distortion_plot(points, optimizer.scale, title=title, kind=kind, source=source)
 
 

@@ -49,7 +49,7 @@ def follow(call: Call, path: Path) -> set[str]:
     [
         (
             "noop",
-            {"non-unit-rotations", "wide-steps", "sign-flips", "no-effect-tracks", "late-start", "loop-seam"},
+            {"non-unit-rotations", "wide-steps", "sign-flips", "no-effect-tracks", "late-start", "end-frame"},
         ),
         ("biped", {"no-effect-tracks", "constant-tracks"}),
         ("tube", set()),

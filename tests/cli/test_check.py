@@ -18,7 +18,7 @@ def test_findings_are_those_of_inspect_one_per_clip(folder: Path, call: Call) ->
     assert run.code == 0
     found = run.json["findings"]
     inspected = call("inspect", "noop.glb", "--format", "json").json["files"][0]["findings"]
-    costly = {"end-frame", "clip-leaves-bounds"}  # those that sample whole clips
+    costly = {"clip-leaves-bounds"}  # those that sample whole clips
     assert {each["name"] for each in found} - costly == {each["name"] for each in inspected}
     flips = [each for each in found if each["name"] == "sign-flips"]
     assert [each["where"] for each in flips] == ["clip 'signs'"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -78,3 +80,38 @@ def test_a_buffer_that_a_fix_leaves_unused_is_a_warning(options: tuple[str, ...]
     run = call("check", "noop.gltf", "--fix", *options)
     problem = "'noop_data.bin' is not used by noop.gltf any more; delete it if nothing else needs it"
     assert f"warning: {problem}\n" in run.err
+
+
+VRM = {
+    "VRMC_vrm": {"expressions": {"preset": {"happy": {"morphTargetBinds": [{"node": 0, "index": 0, "weight": 1.0}]}}}}
+}
+
+
+@pytest.mark.parametrize(
+    ("extensions", "is_moved"),
+    [
+        ({}, True),
+        (VRM, False),
+        ({"VRMC_vrm": {"firstPerson": {"meshAnnotations": [{"node": 0, "type": "auto"}]}}}, False),
+        ({"ACME_faces": {"face": 0}}, False),
+        ({"ACME_faces": {"face": "/nodes/0"}}, False),
+        ({"VRMC_vrm": {"humanoid": {"humanBones": {"hips": {"node": 1}}}}}, True),
+    ],
+)
+def test_a_mesh_stays_on_its_node_if_an_extension_names_it(
+    folder: Path, call: Call, extensions: dict[str, Any], is_moved: bool
+) -> None:
+    """VRM's expressions name the node of a mesh: on another node it would have no expressions."""
+    document = opened(built("tube"))
+    nodes = document.json["nodes"]
+    number = next(i for i, node in enumerate(nodes) if "skin" in node)
+    nodes[number] |= {"translation": [0.0, 1.0, 0.0], "children": [len(nodes)]}
+    nodes.append({"name": "socket"})
+    document.json["extensions"] = json.loads(json.dumps(extensions).replace('"node": 0', f'"node": {number}'))
+    if "ACME_faces" in extensions:
+        face = extensions["ACME_faces"]["face"]
+        document.json["extensions"]["ACME_faces"]["face"] = number if face == 0 else f"/nodes/{number}"
+    (folder / "a.glb").write_bytes(glb_of(document))
+    run = call("check", "a.glb", "--fix", "--select", "GA207", "--format", "json")
+    new = opened((folder / "a.glb").read_bytes()).json["nodes"]
+    assert ("mesh" in new[number], "GA207" in codes(run.json)) == (not is_moved, not is_moved)

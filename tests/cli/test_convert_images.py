@@ -11,6 +11,7 @@ import pytest
 
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, refusal
+from tests.cli.running_recipes import write_recipe
 from tests.fixtures.reading import split
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(20)
@@ -36,8 +37,27 @@ def test_images_stay_beside_and_that_is_said(call: Call, tmp_path: Path) -> None
         "textures/",
         "data:imag",
     ]
-    said = call("convert", path, "-").err
-    assert "note: 2 images stay outside (skin.png, textures/a%20b.jpg); --embed takes them in\n" in said
+
+
+@pytest.mark.parametrize("line", [["convert"], ["resample", "--fps=9"], ["optimize", "--effort=fast"]])
+def test_images_that_a_pipe_leaves_behind_are_a_warning(line: list[str], call: Call, tmp_path: Path) -> None:
+    """They were a note of `convert`, and nothing of other commands."""
+    path = with_images(tmp_path)
+    words = "warning: 2 images left behind (skin.png, textures/a%20b.jpg): a pipe carries one GLB; "
+    said = call(line[0], path, "-", *line[1:], "-q").err
+    assert said.count(words) == 1
+    whole = call("convert", path, "-", "--embed").product()
+    assert "warning" not in call(line[0], "-", "-", *line[1:], stdin=whole).err
+    assert "warning" not in call(line[0], path, tmp_path / "out.glb", *line[1:]).err
+
+
+def test_steps_of_recipes_leave_no_image_behind(call: Call, folder: Path) -> None:
+    with_images(folder / "in")
+    write_recipe(folder, "resample --fps 9", "convert", match="in/*.gltf", out="build/{stem}.glb")
+    run = call("run")
+    run.product()
+    assert "warning" not in run.err
+    assert (folder / "build/skin.png").read_bytes() == PNG
 
 
 @pytest.mark.parametrize("out", ["scene.glb", "scene.gltf"])
@@ -51,19 +71,26 @@ def test_images_go_along_to_another_folder(out: str, line: list[str], call: Call
     assert (tmp_path / "out" / "skin.png").read_bytes() == PNG
     assert (tmp_path / "out" / "textures" / "a b.jpg").read_bytes() == JPEG
     before = (tmp_path / "out" / "skin.png").stat()
-    call(line[0], path, tmp_path / "out" / out, *line[1:]).product()
+    again = call(line[0], path, tmp_path / "out" / out, *line[1:])
+    again.product()
     assert (tmp_path / "out" / "skin.png").stat() == before
+    assert "copied" not in again.err
+    (tmp_path / "out/textures/a b.jpg").unlink()
+    some = call(line[0], path, tmp_path / "out" / out, *line[1:])
+    assert "note: 1 image copied beside the output (textures/a%20b.jpg)\n" in some.err
 
 
 def test_an_image_of_another_file_is_not_overwritten(call: Call, tmp_path: Path) -> None:
     path = with_images(tmp_path / "in")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "skin.png").write_bytes(b"another")
-    call("convert", path, tmp_path / "out" / "scene.gltf").product()
+    run = call("convert", path, tmp_path / "out" / "scene.gltf")
+    run.product()
     assert (tmp_path / "out" / "skin.png").read_bytes() == b"another"
     written = json.loads((tmp_path / "out" / "scene.gltf").read_text())["images"]
     assert re.fullmatch(r"skin-[0-9a-f]{8}\.png", written[0]["uri"])
     assert (tmp_path / "out" / written[0]["uri"]).read_bytes() == PNG
+    assert f"note: 2 images copied beside the output ({written[0]['uri']}, textures/a%20b.jpg)\n" in run.err
     assert written[1]["uri"] == "textures/a%20b.jpg"
 
 

@@ -88,7 +88,7 @@ def test_faults_are_findings_with_names_and_advice(noop: bytes, call: Call) -> N
         "redundant-keys": "info",
         "late-start": "info",
         "one-instant": "info",
-        "loop-seam": "warning",
+        "end-frame": "info",
     }
     assert all(finding[key] for finding in findings for key in ("where", "problem", "advice"))
     assert next(f["where"] for f in findings if f["name"] == "wide-steps") == "clip 'half_turn'"

@@ -144,6 +144,18 @@ def test_an_input_is_not_replaced_by_another_format_through_a_link(
     assert walk.read_bytes() != before
 
 
+@pytest.mark.parametrize("ending", ["npz", "pc2", "gltf"])
+def test_an_input_is_not_replaced_through_a_link_with_the_name_of_a_clip(
+    ending: str, call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = walk.read_bytes()
+    clip = json.loads(call("inspect", walk, "--format", "json").text)["files"][0]["clips"][0]["name"]
+    Path(f"{clip}.{ending}").symlink_to(walk)
+    assert "replaced through a link" in refusal(call("bake", walk, f"{{clip}}.{ending}", "--clip", clip), 2)
+    assert walk.read_bytes() == before
+
+
 def test_a_link_into_a_store_of_other_names_is_edited_in_place(
     call: Call, walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

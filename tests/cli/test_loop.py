@@ -222,6 +222,34 @@ def test_a_joint_that_stays_open_is_named_and_alone_is_bent(call: Call, walk: Pa
     assert len(changed) == 1
 
 
+@pytest.mark.parametrize("name", ["noop.glb", "CesiumMan.glb"])
+def test_inspect_and_check_say_the_same(name: str, call: Call, asset: Find, fixture: Fixture) -> None:
+    """They called a clip that lacks its last frame one to blend, by another length of time."""
+    path = fixture("noop") if name == "noop.glb" else asset(name)
+    report = call("loop", path, "--format", "json").json
+    is_open = [each["kind"] == "open by one frame" for each in report["loops"]]
+    assert any(is_open)
+    inspected = call("inspect", path, "--format", "json").json["files"][0]
+    assert [each["seam_m"] for each in inspected["clips"]] == pytest.approx(
+        [each["seam_m"] for each in report["loops"]]
+    )
+    (found,) = [each for each in inspected["findings"] if each["name"] in ("loop-seam", "end-frame")]
+    assert found["problem"].startswith("open by one frame: a loop jumps by ")
+    assert found["advice"] in report["advice"]
+    checked = call("check", path, "--format", "json").json["findings"]
+    (alone,) = [each for each in checked if each["name"] in ("loop-seam", "end-frame")]
+    assert (alone["problem"], alone["advice"]) == (found["problem"], found["advice"])
+
+
+def test_a_gap_to_blend_has_the_same_advice_in_inspect(call: Call, walk: Path) -> None:
+    """Over the same length of time."""
+    limping = _limping(walk)
+    (advice,) = call("loop", "--clip", "walk", "--format", "json", stdin=limping).json["advice"]
+    findings = call("inspect", "--clip", "walk", "--format", "json", stdin=limping).json["files"][0]["findings"]
+    (found,) = [each for each in findings if each["name"] == "loop-seam"]
+    assert found["advice"].removeprefix("if it is to loop: ") == advice.split(": ", 1)[1]
+
+
 @pytest.mark.slow
 def test_verdicts_on_real_clips(call: Call, asset: Find) -> None:
     """As an artist calls them."""
@@ -248,3 +276,11 @@ def test_verdicts_on_real_clips(call: Call, asset: Find) -> None:
 def test_the_shortest_range_has_a_length(shortest: str, call: Call, fixture: Fixture) -> None:
     run = call("loop", fixture("biped"), "--find", f"--shortest={shortest}")
     assert "--shortest is" in refusal(run, 2)
+
+
+def test_a_list_of_clips_that_can_not_be_closed_is_not_cut(call: Call, asset: Find, tmp_path: Path) -> None:
+    """It ended in the middle of a name."""
+    said = refusal(call("loop", asset("Robot.glb"), tmp_path / "out.glb"), 2)
+    assert said.count(" is ") >= 3
+    assert "…" not in said
+    assert said.rstrip().endswith("; and 1 clip more")

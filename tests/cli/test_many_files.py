@@ -50,6 +50,27 @@ def test_a_failing_file_is_named_and_the_rest_finishes(
     assert (crowd / "out" / "arm 1.glb").read_bytes() == single
 
 
+def test_a_refused_output_is_named_and_the_rest_finishes(crowd: Path, call: Call) -> None:
+    (crowd / "in" / "a broken.glb").unlink()
+    (crowd / "out" / "arm 1.glb").mkdir(parents=True)
+    run = call("resample", "in", "-o", "out/{path}", "--fps", "30")
+    assert run.code == 2
+    assert "gltf-anim: out/arm 1.glb: is a folder (expected a file name)\n" in run.err
+    assert run.err.endswith("2 files, 1 failed\n")
+    assert outputs(crowd / "out") == {"b/tube.glb"}
+
+
+def test_an_output_that_leads_to_an_input_is_refused_alone(crowd: Path, call: Call) -> None:
+    (crowd / "in" / "a broken.glb").unlink()
+    (crowd / "out").mkdir()
+    (crowd / "out" / "arm 1.gltf").symlink_to("../in/arm 1.glb")
+    before = (crowd / "in" / "arm 1.glb").read_bytes()
+    run = call("resample", "in", "-o", "out/{folder}/{stem}.gltf", "--fps", "30")
+    assert (run.code, run.err.splitlines()[-1]) == (2, "2 files, 1 failed")
+    assert (crowd / "in" / "arm 1.glb").read_bytes() == before
+    assert (crowd / "out" / "b" / "tube.gltf").exists()
+
+
 def test_folders_for_files_that_fail_do_not_stay(crowd: Path, call: Call) -> None:
     assert call("retime", "in", "--speed", "2", "-o", "made/{stem}/a.glb").code == 3
     assert outputs(crowd / "made") == {"arm 1/a.glb", "tube/a.glb"}

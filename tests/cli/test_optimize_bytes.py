@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from anim.gltf.io import container
-from anim.optimization import byte_limit
+from anim.optimization import byte_limit, stepwise_limit
 from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import EFFORTS, Effort, Request
 from fixtures.broken.pieces import buffered, glb
 from tests.cli.comparing import apart
-from tests.cli.conftest import Call, Fixture
+from tests.cli.conftest import Call, Find, Fixture
 from tests.cli.running import refusal
 
 FAST = ("--effort", "fast")
@@ -57,7 +57,8 @@ def test_a_search_that_ends_elsewhere_still_fits(
 def test_one_full_search_with_verification(
     fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All sizes before it come from fast searches whose errors are not measured."""
+    """All sizes before it come from fast searches whose errors are not measured; small files are searched more."""
+    monkeypatch.setattr(stepwise_limit, "MAX_VALUES", 0)
     searched = _count_searches(monkeypatch)
     source, output = fixture("noop"), tmp_path / "out.glb"
     assert call("optimize", source, output, "--max-bytes", "5550").code == 0
@@ -194,6 +195,35 @@ def test_unused_bytes_are_worth_another_search(
         assert output.stat().st_size <= 5600
         errors.append(max(each["max_error_m"] for each in run.json["clips"]))
     assert errors[1] <= errors[0]
+
+
+def test_small_files_have_the_smallest_error_around_a_limit(
+    fixture: Fixture, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sizes rise and fall with the bound: one that didn't fit hid smaller ones that do."""
+    errors = {}
+    for most in (0, 20_000):
+        monkeypatch.setattr(stepwise_limit, "MAX_VALUES", most)
+        for limit in (5350, 5450, 5600, 5800):
+            output = tmp_path / "out.glb"
+            run = call("optimize", fixture("noop"), output, "--max-bytes", str(limit), "--report", "-", *FAST)
+            assert output.stat().st_size <= limit
+            errors[most, limit] = max(each["max_error_m"] for each in run.json["clips"])
+    found = [errors[20_000, limit] for limit in (5350, 5450, 5600, 5800)]
+    assert found == sorted(found, reverse=True)
+    assert all(errors[20_000, limit] <= errors[0, limit] for limit in (5350, 5450, 5600, 5800))
+
+
+@pytest.mark.slow
+def test_real_files_have_less_error_for_more_bytes(asset: Find, tmp_path: Path, call: Call) -> None:
+    for name, limits in {"Fox.glb": (128, 129, 130, 132, 137), "CesiumMan.glb": (436, 438, 440, 442, 445)}.items():
+        errors = []
+        for limit in limits:
+            run = call("optimize", asset(name), tmp_path / "a.glb", "--max-bytes", f"{limit}kB", "--report", "-")
+            errors.append(max(each["max_error_m"] for each in run.json["clips"]))
+        assert errors == sorted(errors, reverse=True)
+        if name == "Fox.glb":
+            assert errors[2] < 0.75  # at 130 kB; --max-error 0.44% fits too
 
 
 def test_what_the_whole_search_reaches_fits(fixture: Fixture, tmp_path: Path, call: Call) -> None:

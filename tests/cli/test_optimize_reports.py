@@ -150,7 +150,20 @@ def test_a_curve_as_csv(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert shares == sorted(shares)
     assert all(float(row["error_m"]) <= float(row["max_error_m"]) + 1e-9 for row in rows)
     assert int(rows[-1]["bytes"]) < int(rows[0]["bytes"]) < fixture("noop").stat().st_size
-    assert len(run.err.splitlines()) == len(rows)
+    said = run.err.splitlines()
+    assert (said[0], len(said) - 1) == ("  sizes of --effort fast", len(rows))
+
+
+def test_a_curve_has_the_sizes_of_its_effort(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """They were those of a fast search, whatever was asked for: `optimize` then gave others."""
+    sizes = {}
+    for effort in ((), ("--effort", "balanced")):
+        run = call("optimize", fixture("noop"), "--curve", tmp_path / "curve.csv", *effort)
+        assert run.err.startswith(f"  sizes of --effort {effort[-1] if effort else 'fast'}\n")
+        rows = table((tmp_path / "curve.csv").read_bytes())
+        (sizes[effort],) = [int(row["bytes"]) for row in rows if float(row["share_of_diagonal"]) == 1e-3]
+    assert call("optimize", fixture("noop"), tmp_path / "out.glb", "--max-error", "0.1%").code == 0
+    assert sizes["--effort", "balanced"] == (tmp_path / "out.glb").stat().st_size != sizes[()]
 
 
 def test_a_curve_states_no_error_where_the_file_stays(fixture: Fixture, tmp_path: Path, call: Call) -> None:

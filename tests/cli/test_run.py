@@ -208,8 +208,12 @@ def test_images_are_copied_beside_the_output(folder: Path, call: Call, tmp_path:
     path.write_text(json.dumps(document))
     (folder / "crowd/skin.png").write_bytes(b"\x89PNG")
     write_recipe(folder, *PLAIN, match="crowd/*.gltf", out="build/{stem}.glb")
+    copied = "note: 1 image copied beside the output (skin.png)"
     for status in ("made", "cached"):
-        assert f"1 file: 1 {status}" in call("run").err
+        run = call("run")
+        assert f"1 file: 1 {status}" in run.err
+        assert copied in run.err
+        assert copied not in call("run").err
         assert (folder / "build/skin.png").read_bytes() == b"\x89PNG"
         shutil.rmtree(folder / "build")
 

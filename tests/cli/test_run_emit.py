@@ -124,7 +124,12 @@ def test_images_that_a_pipe_would_lose_are_refused(folder: Path, call: Call) -> 
     path = folder / "crowd/arm.gltf"
     path.write_text(json.dumps({**json.loads(path.read_text()), "images": [{"uri": "skin.png"}]}))
     write_recipe(folder, "resample --fps 12", "optimize", match="crowd/*.gltf", out="build/{stem}.glb")
-    assert "its image 'skin.png' is another file" in refusal(call("run", "--emit", "shell"), 2)
+    run = call("run", "--emit", "shell")
+    assert "its image 'skin.png' is another file" in refusal(run, 2)
+    assert help_line(run) == '`gltf-anim run` copies it; for a script, take images in: steps = ["convert --embed", …]'
+    (folder / "gltf-anim.toml").unlink()
+    write_recipe(folder, "convert --embed", "resample --fps 12", match="crowd/*.gltf", out="build/{stem}.glb")
+    assert "convert crowd/arm.gltf - --embed | gltf-anim resample" in call("run", "--emit", "shell").text
 
 
 @pytest.mark.parametrize("tool", TOOLS)

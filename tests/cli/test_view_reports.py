@@ -77,7 +77,7 @@ def test_findings_link_to_their_clip_or_node(call: Call, tmp_path: Path) -> None
 def test_findings_lead_to_clip_node_and_time(fixture: Fixture, call: Call, tmp_path: Path) -> None:
     call("inspect", fixture("noop"), "--html", tmp_path / "i.html").product()
     links = {each["cells"][0]: each["link"] for each in facts((tmp_path / "i.html").read_bytes())["panels"][0]["rows"]}
-    for name in ("wide-steps", "sign-flips", "loop-seam"):
+    for name in ("wide-steps", "sign-flips", "end-frame"):
         assert None not in links[name].values()
 
 

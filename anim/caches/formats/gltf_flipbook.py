@@ -10,6 +10,7 @@ from anim.arrays import Floats
 from anim.caches.formats import flipbook_keys
 from anim.caches.formats.gltf_stream import GlbFile, primitive, signed, write_document
 from anim.caches.options import WriteOptions, WriteResult
+from anim.caches.source_document.expression_binds import lost_bind_notes
 from anim.caches.source_document.flipbook_pages import replace_by_pages
 from anim.caches.storage import Outputs
 from anim.gltf.authoring_parts import VERTICES
@@ -22,23 +23,25 @@ EXTRAS = "gltf_anim"
 
 def write_visibility(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a flip-book with pages switched by KHR_node_visibility."""
-    _write(cache, outputs, writing, by_scale=False)
+    lost = _write(cache, outputs, writing, by_scale=False)
     known = f"needs a viewer that knows {flipbook_keys.VISIBILITY}; the layout flip-scale plays everywhere"
-    return WriteResult(notes=(known,))
+    return WriteResult(notes=(known, *lost))
 
 
 def write_scale(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteResult:
     """Write a flip-book with pages switched by their scale."""
-    _write(cache, outputs, writing, by_scale=True)
-    return WriteResult()
+    return WriteResult(notes=_write(cache, outputs, writing, by_scale=True))
 
 
-def _write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, by_scale: bool) -> None:
+def _write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, by_scale: bool) -> tuple[str, ...]:
+    """Write the pages; return notes on what the source loses."""
     extras = {EXTRAS: {"cache": NAME, "up": cache.up}}
     if writing.source is None:
         _write_alone(cache, outputs, extras, by_scale=by_scale)
-    else:
-        write_document(replace_by_pages(cache, writing.source, extras=extras, by_scale=by_scale), outputs)
+        return ()
+    document = replace_by_pages(cache, writing.source, extras=extras, by_scale=by_scale)
+    write_document(document, outputs)
+    return lost_bind_notes(writing.source.document.json, document.json)
 
 
 def _write_alone(cache: VertexCache, outputs: Outputs, extras: Json, *, by_scale: bool) -> None:

@@ -11,6 +11,7 @@ from anim.arrays import AnyArray, Floats
 from anim.caches.source_document import retained_channels
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span
 from anim.caches.source_document.excluded_meshes import drop_meshes
+from anim.caches.source_document.expression_binds import drop_binds
 from anim.caches.source_document.placement import Placement, detach_meshes
 from anim.caches.source_document.primitives import BakedVertices, baked_primitives
 from anim.caches.source_document.winding import ReversedFaces, has_negative_determinant
@@ -117,8 +118,9 @@ class DocumentEdit:
                 self.json[key] = [*names, *missing]
 
     def document(self) -> Document:
-        """Return the edited document: one clip, no left-out meshes, no skins and no bytes that nothing uses."""
+        """Return the edited document: one clip, no left-out meshes, no skins, binds and bytes that nothing uses."""
         clip = self._clip()
+        drop_binds(self.json, self.source.document.json, {each.node for each in self.meshes} | self.source.left_out)
         left_out = {self.source.document.json["nodes"][node]["mesh"] for node in self.source.left_out}
         drop_meshes(self.json, left_out, clip)
         if not self.source.keep_skeleton:

@@ -11,49 +11,46 @@ from anim.check.checked_file import CheckedFile
 from anim.check.edits import replace_clips
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
+from anim.check.rules.loop_seam import describe_jump, gaps_by_clip
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
-from anim.measure.equal_clips import first_equal
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.end_frames import EndFrame, EndFrameKind, find_end_frames
+from anim.measure.loops.end_frames import EndFrame, EndFrameKind
+from anim.measure.loops.loop_analysis import LoopKind
+from anim.measure.loops.recommendations import ADVICE
 from anim.model import Clip
 
 MAX_DEVIATION_FRAMES = 0.1  # of a key from the frame that it represents
-PROBLEMS = {
-    EndFrameKind.MISSING: "the clip is open by one frame",
-    EndFrameKind.DUPLICATE: "two frames at the end have the first pose: a loop pauses for a frame",
-}
-ADVICE = {
-    EndFrameKind.MISSING: "to add the frame: gltf-anim loop IN OUT{clip}",
-    EndFrameKind.DUPLICATE: "to remove the frame: gltf-anim trim IN OUT --to {end:.9g}{clip}",
-}
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips."""
-    for number, clip, frame in _end_frames(file):
-        found = file.in_clip(number, value=frame.gap, problem=PROBLEMS[frame.kind], time_s=clip.end)
-        advice = ADVICE[frame.kind].format(clip=reader.choose_option([number]), end=frame_before(clip, frame))
-        yield replace(found, advice=advice)
+    frames = file.end_frames
+    missing = [i for i, frame in frames.items() if frame.kind is EndFrameKind.MISSING]
+    gaps = gaps_by_clip(file, missing)
+    for i, frame in frames.items():
+        clip, joints = file.contents.clips[i], gaps.get(i)
+        node = joints[0].node if joints else None
+        found = file.in_clip(i, value=frame.gap / file.diagonal, problem=frame.kind, time_s=clip.end, node=node)
+        yield found if i in gaps else replace(found, advice=_removal(i, frame_before(clip, frame)))
 
 
-def _end_frames(file: CheckedFile) -> Iterator[tuple[int, Clip, EndFrame]]:
-    clips = [(report.index, clip) for report, clip in file.clips]
-    first = first_equal([(clip,) for _, clip in clips])
-    distinct = {n: clip for n, (_, clip) in enumerate(clips) if first[n] == n}
-    roots = [root_motion_node(file.skeleton, clip) for clip in distinct.values()]
-    frames = dict(zip(distinct, find_end_frames(file.motion, list(distinct.values()), roots), strict=True))
-    for n, (number, clip) in enumerate(clips):
-        if (frame := frames[first[n]]) is not None:
-            yield number, clip, frame
+def _removal(number: int, end: float) -> str:
+    """Advice for a duplicate frame. number: index of the clip. end: time of the frame before, s."""
+    return f"to remove the frame: gltf-anim trim IN OUT --to {end:.9g}{reader.choose_option([number])}"
+
+
+def problem(found: Sequence[Occurrence]) -> str:
+    """Return the fault, which is the same in all occurrences, and the largest gap."""
+    if found[0].problem == EndFrameKind.DUPLICATE:
+        return "two frames at the end have the first pose: a loop pauses for a frame"
+    return f"{LoopKind.OPEN_BY_ONE_FRAME}: {describe_jump(found)}"
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document with the first pose as a last frame of these clips, or without their last frame."""
-    wanted = {each.number for each in found}
-    return replace_clips(
-        file, {i: _corrected(clip, frame, file) for i, clip, frame in _end_frames(file) if i in wanted}
-    )
+    clips = {each.number: file.contents.clips[each.number] for each in found}
+    return replace_clips(file, {i: _corrected(clip, file.end_frames[i], file) for i, clip in clips.items()})
 
 
 def _corrected(clip: Clip, frame: EndFrame, file: CheckedFile) -> Clip:
@@ -80,6 +77,7 @@ RULE = Rule(
     "A clip lacks the frame that would close its loop, or has it twice.",
     "Loops that are exported without their last frame jump by one frame each time round; with two of them they pause.",
     find,
-    is_costly=True,
+    problem,
+    ADVICE[LoopKind.OPEN_BY_ONE_FRAME],
     fix=Fix("add the first pose as a frame, or remove the second one", fix, is_safe=False),
 )

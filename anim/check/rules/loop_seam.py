@@ -17,17 +17,18 @@ from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import JointGap, joint_gaps
+from anim.measure.loops.loop_analysis import LoopKind, analyze_loop
+from anim.measure.loops.recommendations import ADVICE, BLEND_S, blend_duration
 from anim.model import Clip
 from anim.units import format_number
 
 LOOP_NAME = r"(?i)(^|[^a-z])(loop|cycle|idle)([^a-z]|$)"
-BLEND_S = 0.1  # corrected before the end
 MIN_FPS = 20.0  # of the keys added there
 MIN_FRAMES = 2  # in it: the last one has the speed of the first one of the clip
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips with a small loop gap, and those that loop by name and don't."""
+    """Yield the clips with a small loop gap, and those that loop by name and don't; not those of GA108."""
     sizes = {clip.index: clip.seam_m / file.diagonal if file.diagonal else 0.0 for clip in file.facts.clips}
     found = [
         clip
@@ -36,15 +37,16 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         and sizes[clip.index] > parameters["gap"]
         and clip.duration_s > 0
     ]
-    gaps = _gaps(file, [clip.index for clip in found if clip.seam_measured_on == "skin"])
+    found = [clip for clip in found if clip.index not in file.end_frames]
+    gaps = gaps_by_clip(file, [clip.index for clip in found if clip.seam_measured_on == "skin"])
     for clip in found:
         joints = gaps.get(clip.index)
         node = joints[0].node if joints else None
         yield file.in_clip(clip.index, value=sizes[clip.index], time_s=clip.end_s, node=node)
 
 
-def _gaps(file: CheckedFile, numbers: Sequence[int]) -> dict[int, list[JointGap]]:
-    """The joints of clips with a gap, by index of the clip. The translation of a root that travels is none."""
+def gaps_by_clip(file: CheckedFile, numbers: Sequence[int]) -> dict[int, list[JointGap]]:
+    """Return the joints of clips with a gap, by index of the clip. The translation of a root that travels is none."""
     clips = [file.contents.clips[number] for number in numbers]
     ranges = [LoopRange(each, each.start, each.end, root=root_motion_node(file.skeleton, each)) for each in clips]
     return dict(zip(numbers, measure_on_parts(file.motion, ranges, joint_gaps), strict=True))
@@ -52,6 +54,11 @@ def _gaps(file: CheckedFile, numbers: Sequence[int]) -> dict[int, list[JointGap]
 
 def problem(found: Sequence[Occurrence]) -> str:
     """Return the largest gap."""
+    return describe_jump(found)
+
+
+def describe_jump(found: Sequence[Occurrence]) -> str:
+    """Return words for the largest gap; values are loop gaps as fractions of the model's size."""
     largest = max(each.value for each in found)
     return f"a loop jumps by {format_number(100 * largest, 2)} % of the model's size"
 
@@ -62,12 +69,11 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _close(clip: Clip, file: CheckedFile) -> Clip:
-    from anim.measure.loops.loop_analysis import analyze_loop  # only fixes import analyses and operations
-    from anim.operations.close_loop import close_loop
+    from anim.operations.close_loop import close_loop  # only fixes import operations
 
     root = root_motion_node(file.skeleton, clip)
     fps = _frame_rate(clip)
-    blend = min(BLEND_S, clip.end - clip.start) if fps is None else _whole_frames(clip, fps)
+    blend = blend_duration(clip.end - clip.start) if fps is None else _whole_frames(clip, fps)
     return close_loop(clip, analyze_loop(file.motion, clip, root=root), root=root, blend=blend, frame_rate=fps)
 
 
@@ -84,9 +90,9 @@ def _frame_rate(clip: Clip) -> float | None:
 
 
 def _whole_frames(clip: Clip, fps: float) -> float:
-    """Length of a blend of about BLEND_S that starts on a frame, in s."""
+    """Length of a blend of about `blend_duration` that starts on a frame, in s."""
     frames = (clip.end - clip.start) * fps
-    blended = max(BLEND_S * fps, MIN_FRAMES)
+    blended = max(blend_duration(clip.end - clip.start) * fps, MIN_FRAMES)
     first = max(math.floor(frames - blended + GRID_TOLERANCE_FRAMES), 0)
     return min((frames - first) / fps, clip.end - clip.start)
 
@@ -99,10 +105,10 @@ RULE = Rule(
     "The jump is visible each time round: KhronosGroup/glTF#573, KhronosGroup/glTF-Blender-IO#1901.",
     find,
     problem,
-    "if they are to loop: gltf-anim loop IN OUT --blend 0.1{clips}",
+    ADVICE[LoopKind.NOT_A_LOOP],
     parameters={
         "gap": Parameter(0.001, "%", "smallest visible jump, of the model's size"),
         "limit": Parameter(0.05, "%", "largest jump of a clip that nearly loops, of the model's size"),
     },
-    fix=Fix("correct the last 0.1 s to end as they start", fix, is_safe=False),
+    fix=Fix(f"correct the last {BLEND_S:g} s to end as they start", fix, is_safe=False),
 )

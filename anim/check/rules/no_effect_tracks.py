@@ -15,13 +15,11 @@ from anim.sampling.batch import concatenate
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips."""
+    """Yield the clips, with the count that `inspect` lists; not those of one such track alone: a clip keeps one."""
     for clip in file.facts.clips:
-        if not clip.no_effect_tracks:
-            continue
-        stays = clip.no_effect_tracks == sum(clip.tracks.values())  # a clip keeps one track
-        if count := clip.no_effect_tracks - stays:
-            yield file.in_clip(clip.index, count)
+        is_kept = clip.no_effect_tracks == sum(clip.tracks.values()) == 1
+        if clip.no_effect_tracks and not is_kept:
+            yield file.in_clip(clip.index, clip.no_effect_tracks)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

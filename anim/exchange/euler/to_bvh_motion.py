@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from anim.arrays import Bools, Floats, Ints, freeze
 from anim.errors import RangeError, UnsupportedError
 from anim.exchange.euler.curve import Curve, Mode, uniform_modes
-from anim.exchange.euler.frame_error import frame_error
+from anim.exchange.euler.frame_error import frame_error, translation_error
 from anim.exchange.euler.motion import IDENTITY, ZERO, EulerMotion, EulerNode
 from anim.exchange.euler.rotation_order import OrderRules
 from anim.exchange.euler.to_euler import LOCK_TOLERANCE_RAD, check_curve_memory
@@ -29,6 +29,7 @@ from anim.units import format_number, list_some
 GRID_TOLERANCE_FRAMES = 1e-3  # maximum deviation from an even grid, as a fraction of a frame
 TIME_ROUNDING_FRACTION = 2e-7  # relative rounding error of float32 times
 NOTED_ERROR_DEG = 1.0  # degrees, of rotations between frames
+NOTED_ERROR_FRACTION = 0.01  # of the skeleton's size, of translations between frames
 SCALE_ROUNDING = 1e-5  # of a scale, in keys of bakes: matrices that were taken apart in float32
 CONSTANT_TOLERANCE = 1e-6  # variation of a constant offset, as a fraction of the skeleton's size
 BLOCK_VALUES = 1 << 17  # nodes × frames computed at a time
@@ -60,14 +61,14 @@ def to_bvh(
         raise UnsupportedError("there is no node to write")
     orders.check([names[node] for node in chosen])
     shown, times = _frames(clip, fps)
-    nodes = _nodes(
-        _Skeleton(skeleton, clip, chosen, times), [names[node] for node in chosen], orders, shown, meters_per_unit
-    )
+    figure = _Skeleton(skeleton, clip, chosen, times)
+    nodes = _nodes(figure, [names[node] for node in chosen], orders, shown, meters_per_unit)
     notes = (
         skipped_note(_unsupported_tracks(skeleton, clip, chosen))
         + _rename_nodes(skeleton, names, chosen)
         + _shift_start(clip)
         + _lost_between_frames(clip, times)
+        + _lost_translations(skeleton, clip, times, figure)
     )
     return EulerMotion(tuple(nodes), sampled=True, notes=notes)
 
@@ -92,7 +93,9 @@ class _Skeleton:
         turned, unturned = (world_rotations(skeleton, pose.rotation)[chosen] for pose in (moving, still))
         turns = quaternion.multiply(turned, quaternion.conjugate(unturned))
         self._turns = _with_world(turns.swapaxes(0, 1), IDENTITY)
-        self.size = float(np.ptp(self._home[:-1], axis=0).max()) or 1.0
+        own = float(np.ptp(self._home[:-1], axis=0).max())
+        self.size = own or 1.0
+        self.extent = own or float(np.ptp(self._places[:, :-1], axis=(0, 1)).max())  # of the path, without a size
 
     def relative(self, some: slice) -> tuple[Floats, Floats, Floats]:
         """Nodes relative to their parents: offset at rest (n, 3), rotation from rest (F, n, 4), offset (F, n, 3)."""
@@ -218,6 +221,16 @@ def _lost_between_frames(clip: Clip, times: Floats) -> tuple[str, ...]:
         return ()
     error = format_number(float(np.degrees(angle)), 2)
     return (f"between frames, a rotation is up to {error}° from the clip, at {time:.3f} s: a higher rate keeps more",)
+
+
+def _lost_translations(skeleton: Skeleton, clip: Clip, times: Floats, figure: _Skeleton) -> tuple[str, ...]:
+    """A note on translations that the grid loses."""
+    widening = np.sqrt((rest_world(skeleton)[..., :3] ** 2).sum(axis=-2)).max(axis=-1)
+    distance, time = translation_error(clip, times, np.where(skeleton.parents < 0, 1.0, widening[skeleton.parents]))
+    if distance <= max(NOTED_ERROR_FRACTION * figure.extent, CONSTANT_TOLERANCE * figure.size):
+        return ()
+    error = format_number(distance, 2)
+    return (f"between frames, a node is up to {error} m from the clip, at {time:.3f} s: a higher rate keeps more",)
 
 
 def _unsupported_tracks(skeleton: Skeleton, clip: Clip, chosen: Collection[int]) -> list[str]:

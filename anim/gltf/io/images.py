@@ -57,10 +57,10 @@ def copy_images(document: Document, folder: Path, target: Path) -> tuple[Documen
 
 
 def write_copies(copies: Mapping[Path, Path], within: Path | None = None) -> bool:
-    """Copy images to free names; an existing file there has the same bytes. Raises OutputError.
+    """Copy images to free names; an existing file there has the same bytes, and stays. Raises OutputError.
 
-    within: a folder that none of them may leave by a link. Returns False if another process gave a name to another
-    file meanwhile, as one of the same run does: names must be chosen again.
+    Those that are written are named to the guard. within: a folder that none of them may leave by a link. Returns False
+    if another process gave a name to another file meanwhile, as one of the same run does: names must be chosen again.
     """
     if within is not None:
         for path in copies:
@@ -81,6 +81,7 @@ def _write_copy(path: Path, file: Path) -> bool:
                 atomic.move_to_free(temporary, path)
             except FileExistsError:
                 return _is_same(path, file)
+            guard.add_copy(path)
     return True
 
 

@@ -97,7 +97,7 @@ def _is_used_elsewhere(buffer: Path, path: Path) -> bool:
             if depth < NEAR_FOLDERS:
                 return True
             continue
-        near = others if depth < NEAR_FOLDERS else [each for each in others if _is_called_gltf(each)]
+        near = others if depth < NEAR_FOLDERS else [each for each in others if is_called_gltf(each)]
         if any(other != folder / path.name and _needs(other, buffer, address, depth) for other in near):
             return True
     return False
@@ -110,21 +110,23 @@ def _needs(other: Path, buffer: Path, address: str, depth: int) -> bool:
             return True
     except OSError:  # a broken link
         return False
-    is_called_so = _is_called_gltf(other)
+    is_called_so = is_called_gltf(other)
     try:
-        if not other.is_file() or not (is_called_so or _begins_like_gltf(other)):
+        if not other.is_file() or not (is_called_so or begins_like_gltf(other)):
             return False
-        content = _read_json(other)
+        content = read_json(other)
         return _may_name(content, buffer.name) and address in _named(json_text.parse(content))
     except (AnimError, OSError, RecursionError):
         return is_called_so and depth < NEAR_FOLDERS
 
 
-def _is_called_gltf(path: Path) -> bool:
+def is_called_gltf(path: Path) -> bool:
+    """Return whether an extension of glTF is in a name."""
     return any(suffix in path.name.lower() for suffix in container.SUFFIXES)
 
 
-def _begins_like_gltf(path: Path) -> bool:
+def begins_like_gltf(path: Path) -> bool:
+    """Return whether the first bytes of a file are those of a GLB or of JSON. Raises OSError."""
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     return head.startswith(container.MAGIC) or head.lstrip(_BLANK).startswith(b"{")
@@ -155,8 +157,8 @@ def _opened(path: Path) -> Document:
         return container.read(file.read())
 
 
-def _read_json(path: Path) -> bytes:
-    """The bytes of a .gltf, or of a GLB up to the end of its JSON."""
+def read_json(path: Path) -> bytes:
+    """Return the bytes of a .gltf, or of a GLB up to the end of its JSON. Raises OSError."""
     with path.open("rb") as file:
         head = file.read(20)
         is_glb = head.startswith(container.MAGIC)

@@ -38,7 +38,7 @@ _SCALARS = frozenset({str, int, float, bool, type(None)})  # a lookup is half as
 _LONG_ARRAYS = frozenset({"accessors", "bufferViews", "animations", "samplers", "channels", "target"})  # and below
 MAX_PROPERTIES = 64  # of objects that are looked at property by property
 _POINTERS = {  # JSON pointers to elements of an array, also with a # or a file's name before them
-    key: re.compile(rf"\b(?:{key})/([0-9]{{1,18}})") for key in ("accessors|bufferViews", "buffers", "meshes")
+    key: re.compile(rf"\b(?:{key})/([0-9]{{1,18}})") for key in ("accessors|bufferViews", "buffers", "meshes", "nodes")
 }
 _Path: TypeAlias = tuple["_Path", str | int] | None  # of a value in JSON: its parent's, and its key or index there
 
@@ -109,6 +109,17 @@ def possible_indices(value: Any) -> set[int]:
 def possible_mesh_indices(value: Any) -> set[int]:
     """Return all that may be an index of a mesh inside an extension."""
     return {number for _, item in _scalars(value) for number in _indices(item, "meshes")}
+
+
+def possible_nodes(json: Json) -> set[int]:
+    """Return all that may be an index of a node inside extensions.
+
+    Known ones name a node by "node", as VRM's expressions and colliders do; in unknown ones any number may be one.
+    """
+    unknown = (pair for _, part in unknown_extensions(json) for pair in _scalars(part))
+    every = (pair for _, part in unknown_extensions(json, frozenset()) for pair in _scalars(part))
+    named = (item for key, item in every if key == "node")
+    return {number for item in chain((item for _, item in unknown), named) for number in _indices(item, "nodes")}
 
 
 def named_buffers(value: Any) -> set[int]:

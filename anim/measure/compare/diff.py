@@ -10,10 +10,12 @@ import numpy as np
 
 from anim.arrays import Floats, Ints
 from anim.errors import AnimError
+from anim.gltf.document import Json
 from anim.gltf.reading.reader import clip_label
 from anim.measure.compare import name_matching
 from anim.measure.compare.correspondence import Correspondence
 from anim.measure.compare.equal_scenes import are_equal, no_error
+from anim.measure.compare.static_pointers import add_static_pointers
 from anim.measure.continuous_bound.prover import Prover
 from anim.measure.equal_clips import first_equal
 from anim.measure.error.metric import ErrorMetric
@@ -33,6 +35,7 @@ class ClipDiff(NamedTuple):
     old, new: their indices in the files. certified: m, upper bound of the error at all times; None if it could not be
     proven. end_old, end_new: s, their last keys.
     missing, added: targets of tracks of only the old or only the new clip: (node or pointer, path).
+    unmeasured: pointers among these to properties whose value in the other file is not known.
     """
 
     old: int
@@ -46,6 +49,7 @@ class ClipDiff(NamedTuple):
     end_new: float
     missing: tuple[tuple[str, str], ...]
     added: tuple[tuple[str, str], ...]
+    unmeasured: tuple[str, ...] = ()
 
 
 class Diff(NamedTuple):
@@ -84,18 +88,20 @@ def diff(
     chosen: Sequence[int] | None = None,
     player: str = "spec",
     fps: float = FPS,
+    documents: tuple[Json | None, Json | None] = (None, None),
 ) -> Diff:
     """Return the difference of the `new` clips from the `old` ones, on the two scenes of the metric.
 
     chosen: indices of the old clips to compare, all by default. player: a name in PLAYERS, for both, or two,
     "spec,nlerp": then `old` and `new` can be the same clips, and nothing is proven between the sampled times.
     fps: frames per second of the grid that is sampled in addition to the keys of both.
+    documents: JSON of both files, with the values of properties that only one of two clips animates.
     Clips are matched by name, then in order if one has no name or the files have no name in common.
     """
     partners = name_matching.match_by_name_then_order([clip.name for clip in old], [clip.name for clip in new])
     wanted = range(len(old)) if chosen is None else chosen
     pairs = [(i, int(partners[i])) for i in wanted if partners[i] >= 0]
-    found = _compare_pairs(Prover(ruler), old, new, pairs, player=player, fps=fps)
+    found = _compare_pairs(Prover(ruler), old, new, pairs, documents, player=player, fps=fps)
     found.sort(key=lambda each: -each.error.max_error)
     taken = set(partners.tolist())
     nodes = ruler.pairs.nodes
@@ -107,7 +113,7 @@ def diff(
         _names(ruler.scene, np.flatnonzero(nodes < 0)),
         _names(ruler.other, _missing(nodes, len(ruler.other.skeleton))),
         ruler.pairs.by_vertex,
-        (*_mesh_warnings(ruler.pairs), *_end_warnings(found)),
+        (*_mesh_warnings(ruler.pairs), *_end_warnings(found), *_pointer_warnings(found)),
     )
 
 
@@ -148,6 +154,13 @@ def _end_warnings(clips: Sequence[ClipDiff]) -> Iterator[str]:
         )
 
 
+def _pointer_warnings(clips: Sequence[ClipDiff]) -> Iterator[str]:
+    """Yield a sentence on properties that only one file animates, without a value in the other one."""
+    pointers = list(dict.fromkeys(pointer for each in clips for pointer in each.unmeasured))
+    if pointers:
+        yield f"{list_some(pointers, FEW)}: animated in one file only, without a known value in the other: not measured"
+
+
 def _listed(names: Sequence[str]) -> str:
     """Names of meshes and the verb: "mesh 'body' has", "meshes 'body', 'hair' and 3 more have"."""
     if len(names) == 1:
@@ -161,6 +174,7 @@ def _compare_pairs(
     old: Sequence[Clip],
     new: Sequence[Clip],
     pairs: Sequence[tuple[int, int]],
+    documents: tuple[Json | None, Json | None],
     *,
     player: str,
     fps: float,
@@ -174,7 +188,8 @@ def _compare_pairs(
         if first[n] < n:
             found.append(found[first[n]]._replace(old=i, new=j, name=old[i].name, new_name=new[j].name))
             continue
-        before, after = old[i], new[j]
+        before, no_old_value = add_static_pointers(old[i], new[j], documents[0])
+        after, no_new_value = add_static_pointers(new[j], old[i], documents[1])
         try:
             times = dense_times(before, after, fps=fps)
         except AnimError as error:
@@ -185,8 +200,10 @@ def _compare_pairs(
             part = prover.ruler.part(before, after) if same_scenes else None
             placed = (prover, before, after) if part is None else (Prover(part[0]), *part[1:])
             measured = _measure(*placed, times, player=player, fps=fps)
-        ends = before.end, after.end
-        found.append(ClipDiff(i, j, before.name, after.name, *measured, *ends, *_lost(prover.ruler, before, after)))
+        ends = old[i].end, new[j].end
+        missing, added = _lost(prover.ruler, old[i], new[j])
+        unmeasured = no_old_value + no_new_value
+        found.append(ClipDiff(i, j, before.name, after.name, *measured, *ends, missing, added, unmeasured))
     return found
 
 
@@ -212,7 +229,9 @@ def _measure(prover: Prover, before: Clip, after: Clip, times: Floats, *, player
     return _Measured(error, bound, found.capped(error.max_error))
 
 
-def _lost(ruler: ErrorMetric, before: Clip, after: Clip) -> tuple[tuple[tuple[str, str], ...], ...]:
+def _lost(
+    ruler: ErrorMetric, before: Clip, after: Clip
+) -> tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]:
     """Targets of tracks of only the old clip, and of only the new one."""
     nodes = ruler.pairs.nodes
     one = {_target(track, int(nodes[track.node]) if track.node is not None else -1): track for track in before.tracks}

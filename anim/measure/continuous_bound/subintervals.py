@@ -75,7 +75,9 @@ class OpenIntervals:
 
     def num_parts(self, margin: Floats | float) -> Ints:
         """Return the number of parts (F,) in which no displacement rises more than `margin` (C, F) or (F,) m."""
-        rises = np.where(self.is_open, self.rise / margin, 0.0).max(axis=0)
+        open_rise = np.where(self.is_open, self.rise, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):  # no margin where the scene has no size: parts at most
+            rises = np.where(open_rise > 0, open_rise / margin, 0.0).max(axis=0)
         return np.asarray(np.clip(np.ceil(np.sqrt(rises)), 1, MAX_PARTS), np.int64)
 
     def margin(self, target: Floats | float, least: Floats | float) -> Floats:

@@ -6,22 +6,22 @@ the length of a clip.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache, cached_property, partial
 from itertools import starmap
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anim.arrays import Floats, Ints
+from anim.arrays import Bools, Floats, Ints
 from anim.measure.compare.correspondence import Correspondence, match_scenes
 from anim.measure.error.combined_groups import combine_groups
 from anim.measure.error.max_displacement import max_displacement
 from anim.measure.error.merged_groups import merge_points, merge_surfaces
 from anim.measure.error.motion_error import MotionError
 from anim.measure.error.point_groups import PointGroups, SkinnedGroups
-from anim.measure.error.pointer_error import pointer_error
+from anim.measure.error.pointer_error import find_still_weights, pointer_error, still_weight_error
 from anim.measure.error.posed_clips import AskedTimes, RecentSamplers, Samplers, pose_clips
 from anim.measure.error.reduced_skeleton import ReducedSkeleton, reduce_skeletons
 from anim.measure.error.sample_times import dense_times
@@ -208,9 +208,21 @@ class ErrorMetric:
         old, new = (
             resolve_weight_pointers(s.skeleton, clip) for s, clip in ((self.scene, before), (self.other, after))
         )
-        fraction, pointer = pointer_error(old, new, times)
+        fraction, pointer = self._pointer_error(old, new, times)
         called = self.called(joint)
         return MotionError(size, time, place, called, len(times), fraction, pointer, vertex, around), worst, only
+
+    def _pointer_error(self, before: Clip, after: Clip, times: Floats) -> tuple[float, str]:
+        """The largest error of a track that moves nothing, as a fraction of its range, and its name."""
+        pointer = pointer_error(before, after, times)
+        fraction, node = still_weight_error(before, after, times, self.pairs.nodes, self._find_still_weights)
+        if fraction <= pointer[0]:
+            return pointer
+        return fraction, f"the weights of '{self.scene.skeleton.display_name(node)}'"
+
+    @cached_property
+    def _find_still_weights(self) -> Callable[[int], Bools]:
+        return cache(partial(find_still_weights, self.scene))
 
     def _blocks_of_players(self, before: Clip, after: Clip, times: Floats, players: Sequence[str]) -> Iterator[Block]:
         """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""

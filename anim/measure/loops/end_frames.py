@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from anim.arrays import Floats
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import moving_nodes
@@ -20,7 +21,7 @@ from anim.measure.loops.loop_criteria import (
     loop_frame_rate,
     open_joints,
 )
-from anim.measure.loops.seam import Seam, measure_seams
+from anim.measure.loops.seam import measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip
 
@@ -43,41 +44,31 @@ class EndFrame(NamedTuple):
     gap: float
 
 
-def find_end_frames(skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int]) -> list[EndFrame | None]:
+def find_end_frames(
+    skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int], gaps: Sequence[float]
+) -> list[EndFrame | None]:
     """Return the fault of the last frame of each clip, None without one.
 
     Missing: `analyze_loop` calls the clip open by one frame, with a visible gap; the motion inside is not sampled.
     Duplicate: two frames at the end have the pose of the first one, and the clip moves visibly before and after them.
-    roots: nodes of root motion by clip, −1 for none.
+    roots: nodes of root motion by clip, −1 for none. gaps: loop gaps in m, as `measure_seams` returns them.
     """
     if not len(skin.points):
         return [None] * len(clips)
     ranges = [_whole_range(clip, root) for clip, root in zip(clips, roots, strict=True)]
-    return measure_on_parts(skin, ranges, _find_end_frames)
-
-
-def _find_end_frames(skin: SkinMotion, ranges: Sequence[LoopRange]) -> list[EndFrame | None]:
-    seams = measure_seams(skin, ranges)
-    missing = [i for i, seam in enumerate(seams) if ranges[i].frame and _is_visible(skin, seam) and is_one_frame(seam)]
-    duplicate = [i for i, seam in enumerate(seams) if _may_be_duplicate(ranges[i]) and _is_noise(skin, seam)]
+    size = skin.size
+    missing = [i for i, gap in enumerate(gaps) if ranges[i].frame and gap > VISIBLE_GAP_PER_SIZE * size]
+    duplicate = [i for i, gap in enumerate(gaps) if _may_be_duplicate(ranges[i]) and gap <= NOISE_PER_SIZE * size]
     kinds = dict.fromkeys(_with(missing, _are_missing, skin, ranges), EndFrameKind.MISSING)
     kinds |= dict.fromkeys(_with(duplicate, _are_duplicate, skin, ranges), EndFrameKind.DUPLICATE)
     return [
-        EndFrame(kinds[i], each.frame, seam.gap) if i in kinds else None
-        for i, (each, seam) in enumerate(zip(ranges, seams, strict=True))
+        EndFrame(kinds[i], each.frame, gap) if i in kinds else None
+        for i, (each, gap) in enumerate(zip(ranges, gaps, strict=True))
     ]
 
 
 def _whole_range(clip: Clip, root: int) -> LoopRange:
     return LoopRange(clip, clip.start, clip.end, frame_duration(loop_frame_rate(clip), clip.start, clip.end), root)
-
-
-def _is_visible(skin: SkinMotion, seam: Seam) -> bool:
-    return seam.gap > VISIBLE_GAP_PER_SIZE * skin.size
-
-
-def _is_noise(skin: SkinMotion, seam: Seam) -> bool:
-    return seam.gap <= NOISE_PER_SIZE * skin.size
 
 
 def _may_be_duplicate(whole: LoopRange) -> bool:
@@ -87,24 +78,38 @@ def _may_be_duplicate(whole: LoopRange) -> bool:
 
 def _with(
     numbers: Sequence[int],
-    judge: Callable[[SkinMotion, Sequence[LoopRange]], Sequence[bool]],
+    judge: Callable[[SkinMotion, Sequence[LoopRange]], list[bool]],
     skin: SkinMotion,
     ranges: Sequence[LoopRange],
 ) -> list[int]:
     """Those of some indices of ranges for which a function is true."""
-    return [i for i, fits in zip(numbers, judge(skin, [ranges[i] for i in numbers]), strict=True) if fits]
+    fits = measure_on_parts(skin, [ranges[i] for i in numbers], judge)
+    return [i for i, each in zip(numbers, fits, strict=True) if each]
 
 
 def _are_missing(skin: SkinMotion, ranges: Sequence[LoopRange]) -> list[bool]:
-    both = zip(open_joints(skin, ranges), moving_nodes(skin, ranges), strict=True)
-    return [not are_few(joints, moving) for joints, moving in both]
+    near = [i for i, seam in enumerate(measure_seams(skin, ranges)) if is_one_frame(seam)]
+    some = [ranges[i] for i in near]
+    both = zip(near, open_joints(skin, some), moving_nodes(skin, some), strict=True)
+    fitting = {i for i, joints, moving in both if not are_few(joints, moving)}
+    return [i in fitting for i in range(len(ranges))]
 
 
 def _are_duplicate(skin: SkinMotion, ranges: Sequence[LoopRange]) -> list[bool]:
     if not ranges:
         return []
-    before = np.array([(each.start, each.end - 2 * each.frame, each.end - each.frame) for each in ranges])
+    (still,) = _frame_steps(skin, ranges, [each.end - each.frame for each in ranges])
+    at_rest = np.flatnonzero(still <= NOISE_PER_SIZE).tolist()  # few: the other frames are sampled for those alone
+    some = [ranges[i] for i in at_rest]
+    steps = _frame_steps(skin, some, [each.start for each in some], [each.end - 2 * each.frame for each in some])
+    moves = dict(zip(at_rest, steps.min(axis=0) > VISIBLE_GAP_PER_SIZE, strict=True))
+    return [bool(moves.get(i, False)) for i in range(len(ranges))]
+
+
+def _frame_steps(skin: SkinMotion, ranges: Sequence[LoopRange], *starts: Sequence[float]) -> Floats:
+    """Largest motion (S, R) of a vertex in S frames of each range, of the model's size. starts: of the frames, s."""
+    if not ranges:
+        return np.zeros((len(starts), 0))
+    before = np.array(starts).T
     after = before + np.array([each.frame for each in ranges])[:, None]
-    first, last, still = skin.steps(ranges, np.stack((before, after), axis=1)).T / skin.size
-    fits = (np.minimum(first, last) > VISIBLE_GAP_PER_SIZE) & (still <= NOISE_PER_SIZE)
-    return [bool(each) for each in fits]
+    return skin.steps(ranges, np.stack((before, after), axis=1)).T / skin.size

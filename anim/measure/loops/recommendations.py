@@ -11,11 +11,12 @@ BLEND_S = 0.25  # s over which a gap is closed, in clips of at least four times 
 MAX_VELOCITY_GAP = 3.0  # of the median speed of the fastest vertex; a larger one is visible
 MIN_VELOCITY_GAP_M_S = 1e-3  # m/s; rounding of static clips is below
 
-_WORDS = {
-    LoopKind.OPEN_BY_ONE_FRAME: "to add the last frame that is missing",
-    LoopKind.CLOSED_EXCEPT: "to close the joints that are open",
-    LoopKind.NOT_A_LOOP: "if it is to loop",
-    LoopKind.CLOSED: f"to close a velocity gap of more than {MAX_VELOCITY_GAP:g} times the usual speed",
+_CLOSING = "gltf-anim loop IN OUT{blend}{clips}"
+ADVICE = {  # with {blend} and {clips} for the options
+    LoopKind.OPEN_BY_ONE_FRAME: "to add the last frame that is missing: gltf-anim loop IN OUT{clips}",
+    LoopKind.CLOSED_EXCEPT: f"to close the joints that are open: {_CLOSING}",
+    LoopKind.NOT_A_LOOP: f"if it is to loop: {_CLOSING}",
+    LoopKind.CLOSED: f"to close a velocity gap of more than {MAX_VELOCITY_GAP:g} times the usual speed: {_CLOSING}",
 }
 
 
@@ -24,13 +25,11 @@ def recommend(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
 
     recommend([(0, open_by_one_frame)]) → "to add the last frame that is missing: gltf-anim loop IN OUT --clip '#0'"
     """
-    for kind, words in _WORDS.items():
+    for kind, advice in ADVICE.items():
         of_kind = [(number, each) for number, each in found if each.kind is kind and _is_open(each)]
         if of_kind:
-            durations = [each.end - each.start for _, each in of_kind]
-            blend = "" if kind is LoopKind.OPEN_BY_ONE_FRAME else _blend(durations)
             clips = "".join(f" --clip '#{number}'" for number, _ in of_kind)  # all: others stay unchanged
-            yield f"{words}: gltf-anim loop IN OUT{blend}{clips}"
+            yield advice.format(blend=blend_option([each.end - each.start for _, each in of_kind]), clips=clips)
 
 
 def _is_open(loop: Loop) -> bool:
@@ -43,9 +42,14 @@ def _is_open(loop: Loop) -> bool:
 
 def closing_command(clip: Clip, number: int) -> str:
     """Return the command that closes a clip of any kind."""
-    return f"gltf-anim loop IN OUT{_blend([clip.end - clip.start])} --clip '#{number}'"
+    return _CLOSING.format(blend=blend_option([clip.end - clip.start]), clips=f" --clip '#{number}'")
 
 
-def _blend(durations: Sequence[float]) -> str:
-    """The option --blend for clips of these durations in seconds."""
-    return f" --blend {min(BLEND_S, *(duration / 4 for duration in durations)):.3g}"
+def blend_option(durations: Sequence[float]) -> str:
+    """Return the option --blend for clips of these durations in seconds."""
+    return f" --blend {min(map(blend_duration, durations)):.3g}"
+
+
+def blend_duration(duration: float) -> float:
+    """Return the time in s over which the gap of a clip of some duration in s is closed."""
+    return min(BLEND_S, duration / 4)

@@ -36,6 +36,19 @@ def influence_radius(surfaces: Sequence[Surface], node: int, widening: float) ->
     return widening * every[:, every.max(axis=0) > 0]
 
 
+def bound_still_weights(track: Track, reach: Floats, bound: float, fraction: float) -> Floats:
+    """Return the reach (M, V + U) with a vertex for each of U weights that move none, as targets of normals only.
+
+    Their error, as a `fraction` of each one's range, is then a displacement by `bound`, m. Both are above 0.
+    """
+    still = np.flatnonzero(~reach.any(axis=1))
+    values = sample(track, track.times)[:, still]
+    ranges = np.where(np.ptp(values, axis=0) > 0, np.ptp(values, axis=0), np.abs(values).max(axis=0))
+    added = np.zeros((len(reach), len(still)))
+    added[still, np.arange(len(still))] = bound / (fraction * np.where(ranges > 0, ranges, 1.0))
+    return np.concatenate([reach, added], axis=1)
+
+
 def weight_error(track: Track, weights: Floats, reach: Floats) -> float:
     """Return the largest displacement, m, between constant weights (M,) and the track, at its keys."""
     return _displacement(sample(track, track.times) - weights, reach)

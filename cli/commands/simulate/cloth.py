@@ -168,7 +168,7 @@ def command(
             self_collision,
             tethers,
             fps,
-            duration if duration is not None else driver.end - driver.start or 2.0,
+            simulation.chosen_duration(duration, driver),
             warm_up,
             loop,
             estimate_error=kind == "json",

@@ -202,7 +202,7 @@ def command(
             start,
             end,
         )
-        seconds = duration if duration is not None else driver.end - driver.start or 2.0
+        seconds = simulation.chosen_duration(duration, driver)
         chosen = replace(
             options,
             duration=seconds,

@@ -31,7 +31,6 @@ from cli.options.simulation import name_option, parse_seconds, parse_vector
 from cli.text import Reporter
 from cli.workflows.simulate_clip import note_own_clip, simulate_clip
 
-DEFAULT_DURATION_S = 5.0
 ROUNDING_M = 1e-6  # float32 of a body some metres from the center
 Shape = StrEnum("Shape", [(name, name) for name in SHAPES])  # type: ignore[misc]
 HULL = Shape("hull")
@@ -109,7 +108,7 @@ def command(
         chosen = ChosenNodes(bodies, shape.value, _nodes(scene, collider), motion, material)
         description = replace(add_chosen(description, scene, chosen), floor=floor, floor_material=material)
         description = _with_velocities(description, scene, velocity or [])
-        seconds = duration if duration is not None else driver.end - driver.start or DEFAULT_DURATION_S
+        seconds = simulation.chosen_duration(duration, driver, simulation.RIGID_DURATION_S)
         error = units.parse_length(max_error, "--max-error", lambda: diagonal(scene)) if max_error else 0.0
         run = simulate_rigid_bodies(scene, driver, description, replace(options, duration=seconds, max_error=error))
         for note in run.notes:

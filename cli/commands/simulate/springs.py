@@ -148,25 +148,26 @@ def command(
             raise UsageError("--loop closes the whole clip (expected no --duration)")
         if hit_radius is not None:
             changes["hit_radius"] = units.parse_length(hit_radius, "--hit-radius", lambda: diagonal(scene))
+        timed = replace(options, duration=simulation.chosen_duration(duration, driver))
         is_vrm = stiffness is not None or drag is not None
         own = SpringParameters(frequency=None if is_vrm else DEFAULT_FREQUENCY_HZ)
         bones = _chains(document, scene.skeleton, chain or [], springs, center, own).with_parameters(**changes)
         try:
-            result = simulate_springs(scene.skeleton, driver, bones, options)
+            result = simulate_springs(scene.skeleton, driver, bones, timed)
         except UnstableError as gone:
-            raise report_divergence(scene.skeleton, bones, options, gone) from None
-        for note in _notes(result, scene.skeleton, options):
+            raise report_divergence(scene.skeleton, bones, timed, gone) from None
+        for note in _notes(result, scene.skeleton, timed):
             reporter.info(f"note: {note}")
         prover = Prover(ErrorMetric(scene)) if max_error is not None or report is not None else None
         error = depth = None
         if prover is not None and report is not None and result.joints:  # all can be without length
-            error = step_error(prover, scene.skeleton, driver, bones, options, result)
+            error = step_error(prover, scene.skeleton, driver, bones, timed, result)
             depth = deepest_penetration(scene.skeleton, result.clip, bones, _key_times(result))
         reduced = ""
         if prover is not None and max_error is not None:
             bound = units.parse_length(max_error, "--max-error", lambda: prover.ruler.diagonal)
             result, reduced = _reduce(result, prover, bound)
-        found = make_report(scene.skeleton, bones, options, result, error, depth)
+        found = make_report(scene.skeleton, bones, timed, result, error, depth)
         return _written(document, result.clip, number), found, _summary(found, result) + reduced
 
     simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run)

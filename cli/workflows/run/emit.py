@@ -127,7 +127,7 @@ def _check_images(job: Job) -> None:
     if outside:
         raise UsageError(
             f"{job.input}: its image '{outside[0]}' is another file, which commands in a pipe do not copy",
-            help=f'a first step "convert {EMBED}" takes images in',
+            help=f'`gltf-anim run` copies it; for a script, take images in: steps = ["convert {EMBED}", …]',
         )
 
 

@@ -9,19 +9,21 @@ import shlex
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
+from typing import NamedTuple
 
 import numpy as np
 
 from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import AnimError, UnsupportedError, not_written
-from anim.files import atomic
+from anim.files import atomic, guard
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import container, images
 from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
 from anim.gltf.io.text_form import restore_text_form
 from cli import errors, main
+from cli.io import command_files
 from cli.io.documents import PIPE
 from cli.reports import image_notes
 from cli.streams import StepStreams, use_streams
@@ -61,7 +63,8 @@ class JobResult:
 
     stamp: size and modification time of the input when the job began. seconds: of work. input_size: bytes of the input
     with its buffers, as `size` has those of the output. files: stamps by path of all other files read and written; None
-    if one that was read was changed meanwhile, so that nobody knows which content the output is of.
+    if one that was read was changed meanwhile, so that nobody knows which content the output is of. copies: images that
+    were copied beside the output, by their paths from the folder of the settings.
     """
 
     code: int
@@ -71,6 +74,15 @@ class JobResult:
     seconds: float = 0.0
     input_size: int = 0
     files: Mapping[str, Stamp | None] | None = field(default_factory=dict)
+    copies: tuple[str, ...] = ()
+
+
+class WrittenOutput(NamedTuple):
+    """An output as it was written; see `JobResult`."""
+
+    size: int = 0
+    files: Mapping[str, Stamp | None] | None = None
+    copies: tuple[str, ...] = ()
 
 
 def run_job(job: Job) -> JobResult:
@@ -78,23 +90,23 @@ def run_job(job: Job) -> JobResult:
     began, began_ns = time.perf_counter(), time.time_ns()
     stamp = stamp_of(job.folder / job.input)
     streams = StepStreams(job.input, EMPTY, job.folder)
-    size = 0
-    others: dict[str, Stamp | None] | None = None
+    written = WrittenOutput()
 
     def work() -> int:
-        nonlocal size, others
+        nonlocal written
         _check_version(job.version)
         code, files, product = run_steps(job, streams)
         if code == errors.DONE:
             if job.cache is not None:
                 store(job, product, files, began_ns)
-            size, others = write_output(job, product, files, began_ns)
+            written = write_output(job, product, files, began_ns)
         return code
 
     with use_streams(streams):
         code = errors.run_guarded(work)
     seconds = time.perf_counter() - began
-    return JobResult(code, shorten(streams.messages), size, stamp, seconds, input_size(job), others)
+    size, others, copies = written
+    return JobResult(code, shorten(streams.messages), size, stamp, seconds, input_size(job), others, copies)
 
 
 def shorten(messages: Sequence[str]) -> tuple[str, ...]:
@@ -154,21 +166,21 @@ def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int) -> Non
     ResultCache(job.cache).store(key, product, others, is_plain=is_plain)
 
 
-def write_output(
-    job: Job, product: Bytes, read: Iterable[str | Path], began_ns: int
-) -> tuple[int, dict[str, Stamp | None] | None]:
+def write_output(job: Job, product: Bytes, read: Iterable[str | Path], began_ns: int) -> WrittenOutput:
     """Write the GLB of the last step as the output, with external images copied beside it.
 
     read: files that the steps read, which stay when those of a replaced .gltf are removed. The same bytes are not
-    written again. Returns the output's size in bytes, and the stamps of all files of the job besides input and output;
-    None if one that was read, or the input, was changed since a time in ns. Raises AnimError.
+    written again. The result's files are those of the job besides input and output; None if one that was read, or the
+    input, was changed since a time in ns. Raises AnimError.
     """
     with atomic.name_errors(Path(job.output)):  # as while somebody exchanges a folder with a link
         paths = [job.folder / each for each in read]
-        return _write(job, product, paths), _stamp_companions(job, product, paths, began_ns)
+        size, copies = _write(job, product, paths)
+        return WrittenOutput(size, _stamp_companions(job, product, paths, began_ns), copies)
 
 
-def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
+def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> tuple[int, tuple[str, ...]]:
+    """Write the output; return its size in bytes, and the images that were copied, from the folder of the settings."""
     check_output(job, spared)
     path = job.folder / job.output
     try:
@@ -180,14 +192,17 @@ def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> int:
     if is_text(job.output):
         source = source._replace(document=_as_the_last_step_writes(job, source.document))
     try:
-        size = write_file(source.document, str(path), source, unchanged=product, spared=spared, within=job.folder)
+        with guard.use(files := command_files.CommandFiles()):  # of this output alone: it knows the images copied
+            size = write_file(source.document, str(path), source, unchanged=product, spared=spared, within=job.folder)
     except AnimError as error:
         error.problem = error.problem.replace(str(path), job.output)
         raise
     if not source.is_in_folder(str(path)):
-        for line in image_notes.notes(source.document, folder, copied=True):
+        for line in image_notes.notes(source.document, folder, image_notes.relative_names(str(path), files.copies)):
             Reporter().info(line)
-    return size
+    real = os.path.realpath(job.folder)
+    copies = (os.path.relpath(os.path.realpath(each), real) for each in files.copies)
+    return size, tuple(PurePath(each).as_posix() for each in copies)
 
 
 def _as_the_last_step_writes(job: Job, document: Document) -> Document:

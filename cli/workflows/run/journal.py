@@ -26,7 +26,8 @@ class JournalEntry:
     files: stamps by path of the other files that were read and written, such as buffers and images; None in a journal
     of an earlier version. size: bytes of the output with its buffers.
     status: MADE, CACHED, DONE_BEFORE (in an earlier run that is resumed) or FAILED.
-    messages: of failed files, else warnings and notes. settings: name of the settings file; "" in an earlier version.
+    messages: of failed files, else warnings and notes. copies: images that were copied beside the output.
+    settings: name of the settings file; "" in an earlier version.
     """
 
     input: str
@@ -40,6 +41,7 @@ class JournalEntry:
     output_stamp: Stamp | None = None
     files: dict[str, Stamp | None] | None = None
     messages: tuple[str, ...] = ()
+    copies: tuple[str, ...] = ()
     settings: str = ""
 
 
@@ -112,13 +114,14 @@ def _entry(value: dict[str, Any]) -> JournalEntry:
     parsed: dict[str, Any] = {key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value}
     if value.get("files") is not None:
         parsed["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
-    messages = value.get("messages", [])
+    messages, copies = value.get("messages", []), value.get("copies", [])
     texts = [*(value[key] for key in ("input", "output", "recipe", "status")), value.get("settings", "")]
-    if not isinstance(messages, list) or not all(isinstance(each, str) for each in [*texts, *messages]):
+    are_lists = isinstance(messages, list) and isinstance(copies, list)
+    if not are_lists or not all(isinstance(each, str) for each in [*texts, *messages, *copies]):
         raise TypeError("is no entry of a journal")
     if not is_size(value.get("size", 0)) or type(value.get("code", 0)) is not int:
         raise TypeError("has no size or code")
-    return JournalEntry(**{**value, **parsed, "messages": tuple(messages)})
+    return JournalEntry(**{**value, **parsed, "messages": tuple(messages), "copies": tuple(copies)})
 
 
 def _stamp(value: Any) -> Stamp | None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from anim.files.folder_lock import lock_folder
+from anim.gltf.io import images
 from anim.gltf.io.container import SUFFIXES
 from cli.workflows.check_config import matches
 from cli.workflows.run import own_files
@@ -21,6 +23,9 @@ from cli.workflows.run.stamps import Stamp, parse_stamp, stamp_of
 
 NAME = "outputs.json"  # in the folder of the cache
 SCHEMA = 1
+FOLDERS, COPIES = "folders", "copies"  # parts of the record: outputs and images, by folder of settings
+
+T = TypeVar("T")
 
 
 class RecordedOutput(NamedTuple):
@@ -36,18 +41,25 @@ class OutputRecord:
     """Outputs that runs of one folder have written. path: of the record, shared by several such folders.
 
     settings: name of the settings file of this run, in the folder. outputs: by name. One that was changed since is no
-    longer theirs. unsaved: those that only the journal of the last run has, as after it was ended.
+    longer theirs. copies: size and modification time of images that were copied beside outputs. unsaved,
+    unsaved_copies: those that only the journal of the last run has, as after it was ended.
     """
 
     path: Path
     folder: Path
     settings: str
     outputs: Mapping[str, RecordedOutput]
+    copies: Mapping[str, Stamp] = field(default_factory=dict)
     unsaved: Mapping[str, RecordedOutput] = field(default_factory=dict)
+    unsaved_copies: Mapping[str, Stamp] = field(default_factory=dict)
 
     def is_unchanged(self, name: str) -> bool:
         """Return whether a file is an output as it was written."""
         return name in self.outputs and stamp_of(self.folder / name) == self.outputs[name].stamp
+
+    def is_unchanged_copy(self, name: str) -> bool:
+        """Return whether a file is an image as it was copied."""
+        return name in self.copies and stamp_of(self.folder / name) == self.copies[name]
 
     def is_product(self, name: str, recipes: Iterable[Recipe]) -> bool:
         """Return whether a file is an unchanged output of recipes, from an input that may be deleted by now."""
@@ -56,24 +68,31 @@ class OutputRecord:
         source = self.outputs[name].input
         return any(matches(source, each.match) and each.output_of(source) == name for each in recipes)
 
-    def save(self, written: Mapping[str, str], forgotten: Collection[str] = ()) -> None:
-        """Add outputs, each with its input, and unsaved ones to the record as it is now, and remove some.
+    def save(self, written: Mapping[str, str], copies: Iterable[str] = (), forgotten: Collection[str] = ()) -> None:
+        """Add outputs, each with its input, images and unsaved ones to the record as it is now, and remove some.
 
-        Raises OutputError. Another run may have added its own since this record was read.
+        Another run may have added its own since this record was read. Raises OutputError.
         """
         stamps = ((name, source, stamp_of(self.folder / name)) for name, source in written.items())
         new = {
             name: RecordedOutput(source, stamp, self.settings) for name, source, stamp in stamps if stamp is not None
         }
+        copied = {name: stamp for name in copies if (stamp := stamp_of(self.folder / name)) is not None}
         with lock_folder(self.path.parent):
-            folders = _read(self.path)
-            known = _outputs_of(folders, self.folder)
-            kept = {
-                name: each for name, each in sorted({**known, **self.unsaved, **new}.items()) if name not in forgotten
-            }
-            if kept != known:
-                text = json.dumps({"schema": SCHEMA, "folders": {**folders, str(self.folder): kept}}) + "\n"
+            content = _read(self.path)
+            known, before = _outputs_of(content, self.folder), _copies_of(content, self.folder)
+            kept = _without({**known, **self.unsaved, **new}, forgotten)
+            left = _without({**before, **self.unsaved_copies, **copied}, forgotten)
+            if (kept, left) != (known, before):
+                folders = {**content.get(FOLDERS, {}), str(self.folder): kept}
+                others = {**content.get(COPIES, {}), str(self.folder): left}
+                text = json.dumps({"schema": SCHEMA, FOLDERS: folders, COPIES: others}) + "\n"
                 own_files.write(self.path.parent, self.path, np.frombuffer(text.encode(), np.uint8))
+
+    def save_unsaved(self) -> None:
+        """Add to the record what only the journal of the last run has. Raises OutputError."""
+        if self.unsaved or self.unsaved_copies:
+            self.save({})
 
 
 def read_outputs(path: Path, settings: Path, last: Entries) -> OutputRecord:
@@ -84,9 +103,10 @@ def read_outputs(path: Path, settings: Path, last: Entries) -> OutputRecord:
     through.
     """
     own_files.check_links(path.parent, path)
-    folder = settings.parent
-    outputs = _outputs_of(_read(path), folder)
+    folder, content = settings.parent, _read(path)
+    outputs, copies = _outputs_of(content, folder), _copies_of(content, folder)
     unsaved: dict[str, RecordedOutput] = {}
+    unsaved_copies = _copied(folder, last, copies)
     for entry in last.values():
         name, stamp = entry.output, entry.output_stamp
         if stamp is None or not _is_output_name(name):
@@ -94,14 +114,27 @@ def read_outputs(path: Path, settings: Path, last: Entries) -> OutputRecord:
         found = RecordedOutput(entry.input, stamp, entry.settings)
         if outputs.get(name) != found and stamp_of(folder / name) == stamp:
             outputs[name] = unsaved[name] = found
-    return OutputRecord(path, folder, settings.name, outputs, unsaved)
+    return OutputRecord(path, folder, settings.name, outputs, {**copies, **unsaved_copies}, unsaved, unsaved_copies)
 
 
-def _outputs_of(folders: Mapping[str, Any], folder: Path) -> dict[str, RecordedOutput]:
+def _copied(folder: Path, last: Entries, known: Mapping[str, Stamp]) -> dict[str, Stamp]:
+    """The images that the last run copied, and that are unchanged, without known ones."""
+    found = {name: (entry.files or {}).get(os.path.normpath(name)) for entry in last.values() for name in entry.copies}
+    return {
+        name: stamp
+        for name, stamp in found.items()
+        if stamp is not None and known.get(name) != stamp and _is_image_name(name) and stamp_of(folder / name) == stamp
+    }
+
+
+def _without(found: Mapping[str, T], names: Collection[str]) -> dict[str, T]:
+    return {name: each for name, each in sorted(found.items()) if name not in names}
+
+
+def _outputs_of(content: Mapping[str, Any], folder: Path) -> dict[str, RecordedOutput]:
     """The outputs of a folder of settings, without entries of wrong types."""
     outputs: dict[str, RecordedOutput] = {}
-    known = folders.get(str(folder), {})
-    for name, value in known.items() if isinstance(known, dict) else ():
+    for name, value in _entries(content, FOLDERS, folder):
         with suppress(ValueError, TypeError):
             source, stamp, settings = value
             if _is_output_name(name) and isinstance(source, str) and isinstance(settings, str):
@@ -109,16 +142,41 @@ def _outputs_of(folders: Mapping[str, Any], folder: Path) -> dict[str, RecordedO
     return outputs
 
 
+def _copies_of(content: Mapping[str, Any], folder: Path) -> dict[str, Stamp]:
+    """The copied images of a folder of settings, without entries of wrong types."""
+    copies: dict[str, Stamp] = {}
+    for name, value in _entries(content, COPIES, folder):
+        with suppress(ValueError, TypeError):
+            if _is_image_name(name):
+                copies[name] = parse_stamp(value)
+    return copies
+
+
+def _entries(content: Mapping[str, Any], part: str, folder: Path) -> Iterable[tuple[str, Any]]:
+    known = content.get(part, {}).get(str(folder), {})
+    return known.items() if isinstance(known, dict) else ()
+
+
 def _is_output_name(name: str) -> bool:
     """Return whether a recipe can have an output of this name: the record may be another's work."""
+    return _is_inside(name, SUFFIXES)
+
+
+def _is_image_name(name: str) -> bool:
+    """Return whether an image can have been copied to this name."""
+    return _is_inside(name, images.SUFFIXES)
+
+
+def _is_inside(name: str, suffixes: Collection[str]) -> bool:
     path = PurePath(name)
-    return not path.is_absolute() and ".." not in path.parts and path.suffix.lower() in SUFFIXES
+    return not path.is_absolute() and ".." not in path.parts and path.suffix.lower() in suffixes
 
 
 def _read(path: Path) -> dict[str, Any]:
+    """Return the parts of the record that are objects, without others."""
     try:
         value = json.loads(own_files.read(path).decode(errors="surrogateescape"))
     except (OSError, ValueError, RecursionError):
         return {}
-    folders = value.get("folders") if isinstance(value, dict) else None
-    return folders if isinstance(folders, dict) else {}
+    parts = value if isinstance(value, dict) else {}
+    return {part: parts[part] for part in (FOLDERS, COPIES) if isinstance(parts.get(part), dict)}

@@ -22,6 +22,7 @@ from cli.workflows.run.job import (
     EMPTY,
     Job,
     JobResult,
+    WrittenOutput,
     input_size,
     is_text,
     run_job,
@@ -30,7 +31,7 @@ from cli.workflows.run.job import (
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
 from cli.workflows.run.order import group_jobs, keys_read
 from cli.workflows.run.places import output_key
-from cli.workflows.run.stamps import Stamp, stamp_of, stamp_read, status_of
+from cli.workflows.run.stamps import stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import Step
 from cli.workflows.run.workers import local_pool, run_jobs
 
@@ -40,7 +41,8 @@ class RecipeRun:
     """A run of jobs.
 
     cache: None to keep no results. processes: of this machine. cluster: its workers instead of these.
-    written: input by output, of those that are complete, from the folder of the settings. code: the largest exit code.
+    written: input by output, of those that are complete, from the folder of the settings. copies: images copied beside
+    them. code: the largest exit code.
     """
 
     jobs: Sequence[Job]
@@ -50,6 +52,7 @@ class RecipeRun:
     processes: int
     cluster: Cluster | None = None
     written: dict[str, str] = field(default_factory=dict)
+    copies: set[str] = field(default_factory=set)
     counts: Counter[str] = field(default_factory=Counter)
     code: int = errors.DONE
     _hashes: FileHashes = field(default_factory=FileHashes)
@@ -149,17 +152,17 @@ class RecipeRun:
         if product is None:
             return None
         streams = StepStreams(job.input, EMPTY, job.folder)
-        size = 0
-        files: dict[str, Stamp | None] | None = None
+        written = WrittenOutput()
 
         def write() -> None:
-            nonlocal size, files
-            size, files = write_output(job, product, record.files, began_ns)
+            nonlocal written
+            written = write_output(job, product, record.files, began_ns)
 
         with use_streams(streams):
             code = run_guarded(write)
         seconds = time.perf_counter() - began
-        return JobResult(code, tuple(streams.messages), size, stamp, seconds, input_size(job), files)
+        size, files, copies = written
+        return JobResult(code, tuple(streams.messages), size, stamp, seconds, input_size(job), files, copies)
 
     def _recipe(self, job: Job) -> str:
         if job.steps not in self._recipes:
@@ -172,6 +175,7 @@ class RecipeRun:
             self._failed[output_key(job.output)] = job.output, result.code
         else:
             self.written[job.output] = job.input
+        self.copies |= set(result.copies)
         self.code = max(self.code, result.code)
         self._progress.close()
         self._report(job, result, status)
@@ -189,6 +193,7 @@ class RecipeRun:
                 None if status == FAILED else stamp_of(job.folder / job.output),
                 None if result.files is None else dict(result.files),
                 result.messages if status == FAILED else tuple(filter(is_notice, result.messages)),
+                result.copies,
             )
         )
 

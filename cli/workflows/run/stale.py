@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from anim.errors import AnimError
 from anim.gltf.io import gltf_files
 from anim.gltf.io.source import external_files, open_file
-from anim.units import plural
+from anim.units import list_some, plural
 from cli.errors import UsageError
 from cli.text import Reporter
 from cli.workflows import check_config
 from cli.workflows.run.job import Job, is_text
 from cli.workflows.run.outputs import OutputRecord
 from cli.workflows.run.recipe import RecipeBook
+from cli.workflows.run.stale_images import StaleImages
 
 MAX_LISTED_OUTPUTS = 3  # in a note
 
@@ -27,45 +28,51 @@ def report_stale(
     book: RecipeBook,
     jobs: Sequence[Job],
     written: Mapping[str, str],
+    copies: Collection[str],
     reporter: Reporter,
     *,
     delete: bool,
 ) -> None:
     """Name the stale outputs, or delete them, after a run of all files and recipes; save the record.
 
+    written, copies: outputs with their inputs, and images beside them, of this run.
     Without any job none is deleted whose input is still there: a pattern is likely to be mistyped.
     Raises OutputError, and UsageError for settings of budgets that are wrong.
     """
-    stale = find_stale(record, book, jobs)
+    stale, changed = find_stale(record, book, jobs)
     is_doubtful = delete and not jobs and any((record.folder / record.outputs[name].input).exists() for name in stale)
     delete = delete and not is_doubtful
-    record.save(written)
-    if delete and stale:
-        _delete(record.folder, stale, _files_read(book, jobs))
-        record.save({}, stale)
+    record.save(written, copies)
+    images = _delete(record, stale, written, list(_files_read(book, jobs))) if delete and stale else []
     if stale:
-        names = ", ".join(stale[:MAX_LISTED_OUTPUTS]) + (", …" if len(stale) > MAX_LISTED_OUTPUTS else "")
-        what = "deleted" if delete else "--delete-stale deletes them"
+        names = list_some(stale, MAX_LISTED_OUTPUTS)
+        beside = f", with {plural(len(images), 'image')}" if images else ""
+        what = f"deleted{beside}" if delete else "--delete-stale deletes them"
         what = "not deleted, since their inputs are still there" if is_doubtful else what
         reporter.info(
             f"note: no recipe makes {plural(len(stale), 'output')} of earlier runs any more ({names}): {what}"
         )
+    if changed and delete:
+        names = list_some(changed, MAX_LISTED_OUTPUTS)
+        reporter.info(
+            f"note: no recipe makes {plural(len(changed), 'output')} that changed after its run ({names}): not deleted"
+        )
 
 
-def find_stale(record: OutputRecord, book: RecipeBook, jobs: Sequence[Job]) -> list[str]:
-    """Return the unchanged outputs of earlier runs that no job makes and that nothing here reads, sorted.
+def find_stale(record: OutputRecord, book: RecipeBook, jobs: Sequence[Job]) -> tuple[list[str], list[str]]:
+    """Return the outputs of earlier runs that no job makes and that nothing here reads: unchanged and changed, sorted.
 
     Those of other settings in the folder are left alone, whose recipes may make them; so are links, and files behind a
     link, which may be somebody else's.
     """
     outputs = {job.output for job in jobs}
     own = {name for name, each in record.outputs.items() if each.settings == record.settings}
-    unused = filter(record.is_unchanged, sorted(own - outputs))
-    found = [name for name in unused if _is_plain(record.folder, name)]
+    found = [name for name in sorted(own - outputs) if _is_plain(record.folder, name)]
     if not found:
-        return []
+        return [], []
     needed = {_identity(record.folder / name) for name in (*outputs, *_files_read(book, jobs))}
-    return [name for name in found if _identity(record.folder / name) not in needed]
+    unused = [name for name in found if _identity(record.folder / name) not in needed]
+    return list(filter(record.is_unchanged, unused)), [each for each in unused if not record.is_unchanged(each)]
 
 
 def _files_read(book: RecipeBook, jobs: Iterable[Job]) -> Iterator[str]:
@@ -100,19 +107,24 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
-def _delete(folder: Path, names: Sequence[str], read: Iterable[str]) -> None:
-    """Delete outputs, with buffers that nothing else uses, and folders that become empty. Raises OutputError.
+def _delete(record: OutputRecord, names: Sequence[str], written: Iterable[str], read: Sequence[str]) -> list[str]:
+    """Delete outputs, with buffers and images that nothing else uses, and folders that become empty.
 
-    read: files whose buffers remain.
+    written: outputs of this run. read: files whose buffers and images remain. Returns the images. Raises OutputError.
     """
+    folder, images = record.folder, StaleImages(record, names)
     spared = list(_buffers(folder, read)) if any(map(is_text, names)) else []
+    deleted: list[str] = []
     try:
         gltf_files.remove([folder / name for name in names], spared)
+        deleted = images.delete((*(record.outputs.keys() - names), *written, *read))
     finally:
-        for name in names:
+        for name in (*names, *deleted):
             with suppress(OSError):  # not empty
                 for above in (folder / name).relative_to(folder).parents[:-1]:
                     (folder / above).rmdir()
+    record.save({}, forgotten=[*names, *deleted])
+    return deleted
 
 
 def _buffers(folder: Path, names: Iterable[str]) -> Iterator[Path]:

@@ -216,7 +216,7 @@ WRONG: dict[str, tuple[Document | CheckedFile, str]] = {
     "GA104": (opened_fixture("noop"), "/animations/"),
     "GA105": (with_tracks(joint("translation", [[0, 1, 0], [0, 2, 0]], [0.5, 1])), "/animations/0"),
     "GA106": (with_tracks(joint("translation", [[0, 0, 0]], [0])), "/animations/0"),
-    "GA107": (with_tracks(steps([0, 1, 2, 1, 0.02])), "/animations/0"),
+    "GA107": (with_tracks(steps([0, 0, 2, 0.02, 0.02])), "/animations/0"),
     "GA108": (with_tracks(OPEN_WAVE), "/animations/0"),
     "GA109": (with_tracks(track("translation", SECOND**1.7, SMOOTH, node=1)), "/animations/0"),
     "GA110": (with_tracks(WAVE_120), "/animations/0"),

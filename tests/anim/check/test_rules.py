@@ -227,6 +227,15 @@ def test_an_empty_clip_is_an_empty_array_and_has_no_tracks_without_effect() -> N
     assert "GA113" not in {each.code for each in findings}
 
 
+def test_tracks_at_rest_are_counted_as_by_inspect() -> None:
+    """Of a clip with no other tracks one was left out, since it is kept."""
+    alone = with_tracks(joint("scale", [[1, 1, 1], [1, 1, 1]]))
+    assert found(alone, "GA113") == []
+    (finding,) = found(opened_fixture("noop"), "GA113")
+    counts = [clip.no_effect_tracks for clip in checked(opened_fixture("noop")).facts.clips]
+    assert finding.problem == f"{sum(counts)} tracks equal the rest pose"
+
+
 def test_a_clip_of_ignored_channels_is_not_empty() -> None:
     channel = {"sampler": 0, "target": {"path": "rotation"}}
     findings = find_all(checked(edited(put("animations/0/channels", [channel]))))

@@ -22,6 +22,7 @@ from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.end_frames import find_end_frames
 from anim.measure.loops.joint_gaps import joint_gaps
 from anim.measure.loops.loop_analysis import analyze_loops
+from anim.measure.loops.seam import measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Scene
 from anim.operations.resample import resample
@@ -34,6 +35,8 @@ from tests.files import opened
 ARMS = opened(arms(40))
 SCENE, CLIPS = reader.scene(ARMS), reader.clips(ARMS)
 ROOTS = [root_motion.root_motion_node(SCENE.skeleton, each) for each in CLIPS]
+RANGES = [LoopRange(each, each.start, each.end, root=root) for each, root in zip(CLIPS, ROOTS, strict=True)]
+SEAMS = measure_seams(SkinMotion(SCENE), RANGES)
 NEW = tuple(resample(each, fps=7) for each in CLIPS)
 
 
@@ -45,15 +48,14 @@ def _both(measure: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> tuple[
 
 
 def _gaps() -> Any:
-    ranges = [LoopRange(each, each.start, each.end, root=root) for each, root in zip(CLIPS, ROOTS, strict=True)]
-    return measure_on_parts(SkinMotion(SCENE), ranges, joint_gaps)
+    return measure_on_parts(SkinMotion(SCENE), RANGES, joint_gaps)
 
 
 @pytest.mark.parametrize(
     "measure",
     [
         lambda: analyze_loops(SkinMotion(SCENE), CLIPS, ROOTS),
-        lambda: find_end_frames(SkinMotion(SCENE), CLIPS, ROOTS),
+        lambda: find_end_frames(SkinMotion(SCENE), CLIPS, ROOTS, [each.gap for each in SEAMS]),
         _gaps,
     ],
     ids=["loops", "end frames", "joint gaps"],

@@ -128,6 +128,19 @@ def test_pointers_are_compared_as_a_share_of_their_range() -> None:
     assert constant.max_pointer_error == pytest.approx(0.03 / 3)
 
 
+def test_weights_that_move_no_vertex_are_compared_as_a_share_of_their_range() -> None:
+    """The second target moves the point, and its error is a distance."""
+    scene = points_on_a_node([[0, 0, 0]], targets=[[[0, 0, 0]], [[0, 1, 0]]])
+    before = clip(track("weights", [0, 1], [[0.0, 0.0], [2.0, 1.0]]))
+    after = clip(track("weights", [0, 1], [[0.0, 0.0], [1.5, 0.9]]))
+    found = ErrorMetric(scene).error(before, after)
+    assert found.max_error == pytest.approx(0.1)
+    assert found.max_pointer_error == pytest.approx(0.25)
+    assert found.pointer.startswith("the weights of ")
+    moving = clip(track("weights", [0, 1], [[0.0, 0.0], [2.0, 0.9]]))
+    assert ErrorMetric(scene).error(before, moving).max_pointer_error == 0
+
+
 def _product(a: Floats, b: Floats) -> Floats:
     av, aw, bv, bw = a[:3], a[3], b[:3], b[3]
     return np.array([*(aw * bv + bw * av + np.cross(av, bv)), aw * bw - av @ bv])

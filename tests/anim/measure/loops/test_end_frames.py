@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from anim.arrays import Floats
-from anim.measure.loops.end_frames import EndFrameKind, find_end_frames
+from anim.measure.loops.clip_ends import LoopRange
+from anim.measure.loops.end_frames import EndFrame, EndFrameKind, find_end_frames
 from anim.measure.loops.loop_analysis import LoopKind, analyze_loop
+from anim.measure.loops.seam import measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Scene
+from anim.model import Clip, Scene
 from tests.anim.skinning.scenes import random_scene
 from tests.clips import STEP, about, clip, skeleton, track
 
@@ -19,10 +21,16 @@ CLOSED = np.stack((np.sin(CIRCLE), 1 - np.cos(CIRCLE), 0 * CIRCLE), axis=1)
 CLOSED[-1] = CLOSED[0]
 
 
+def end_frame(skin: SkinMotion, moving: Clip) -> EndFrame | None:
+    (seam,) = measure_seams(skin, [LoopRange(moving, moving.start, moving.end)])
+    (found,) = find_end_frames(skin, [moving], [-1], [seam.gap])
+    return found
+
+
 def kind_of(values: Floats, speed: float = 1.0) -> EndFrameKind | None:
     skin = SkinMotion(Scene(skeleton([-1, 0, 1], translation=[[0, 0, 0], [0, 1, 0], [0, 1, 0]]), ()))
     moving = clip(track("translation", np.arange(len(values)) / FPS / speed, values, node=1))
-    (found,) = find_end_frames(skin, [moving], [-1])
+    found = end_frame(skin, moving)
     return None if found is None else found.kind
 
 
@@ -37,7 +45,7 @@ def test_a_key_between_frames_does_not_hide_a_missing_frame() -> None:
     shown = track("scale", np.array([0, 0.13]), [[1.0, 1, 1], [0.0, 0, 0]], STEP, node=2)
     moving = track("translation", np.arange(10) / FPS, CLOSED[:-1], node=1)
     skin = SkinMotion(Scene(skeleton([-1, 0, 1], translation=[[0, 0, 0], [0, 1, 0], [0, 1, 0]]), ()))
-    (found,) = find_end_frames(skin, [clip(moving, shown)], [-1])
+    found = end_frame(skin, clip(moving, shown))
     assert found is not None
     assert (found.kind, found.duration) == (EndFrameKind.MISSING, 1 / FPS)
 
@@ -62,7 +70,7 @@ def test_the_kind_is_that_of_the_analysis(seed: int) -> None:
         for n in (end if i < seed else FPS,)
     ]
     moving = clip(*tracks)
-    (found,) = find_end_frames(skin, [moving], [-1])
+    found = end_frame(skin, moving)
     is_open = analyze_loop(skin, moving).kind is LoopKind.OPEN_BY_ONE_FRAME
     assert is_open == (found is not None and found.kind is EndFrameKind.MISSING)
     assert is_open or seed % 4

@@ -1,0 +1,69 @@
+"""Stale images: those that runs copied beside outputs which are deleted now."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from anim.errors import AnimError
+from anim.gltf.io.container import SUFFIXES
+from anim.gltf.io.file_references import find_near, find_referenced, place_of
+from cli.workflows.run.outputs import OutputRecord
+
+
+class StaleImages:
+    """Images that may be deleted with some outputs: of those that these name, the ones that a run copied.
+
+    Made while the outputs are still there.
+    """
+
+    def __init__(self, record: OutputRecord, outputs: Sequence[str]) -> None:
+        self._folder = record.folder
+        named = _references(record.folder / name for name in outputs) or set() if record.copies else set()
+        places = {name: place_of(record.folder / name) for name in record.copies}
+        self._places = {name: place for name, place in places.items() if place in named}
+        self._are_unchanged = record.is_unchanged_copy
+
+    def delete(self, kept: Iterable[str]) -> list[str]:
+        """Delete the images that are as they were copied, and that nothing else refers to; return their names.
+
+        kept: files that remain and may refer to them, or are one of them: outputs, and what runs and checks read.
+        Other glTF files count in the images' folders and above, and links there. If one of all these can't be read,
+        every image remains.
+        """
+        names = [name for name in self._places if self._are_unchanged(name) and self._is_plain(name)]
+        if not names:
+            return []
+        files = [self._folder / each for each in kept]
+        used = _references(file for file in files if file.suffix.lower() in SUFFIXES and file.exists())
+        near = _near(self._places[name] for name in names)
+        if used is None or near is None:
+            return []
+        used |= near | {place_of(file) for file in files}
+        return [name for name in names if self._places[name] not in used and self._unlink(name)]
+
+    def _is_plain(self, name: str) -> bool:
+        """Return whether no link is on the way to an image."""
+        return self._places[name] == os.path.normcase(os.path.join(os.path.realpath(self._folder), name))
+
+    def _unlink(self, name: str) -> bool:
+        with suppress(OSError):
+            (self._folder / name).unlink()
+            return True
+        return False
+
+
+def _references(files: Iterable[Path]) -> set[str] | None:
+    try:
+        return find_referenced(files)
+    except (AnimError, OSError, RecursionError):
+        return None
+
+
+def _near(places: Iterable[str]) -> set[str] | None:
+    try:
+        return find_near(places)
+    except (AnimError, OSError, RecursionError):
+        return None
