@@ -53,6 +53,29 @@ def test_only_outputs_below_the_folder_are_deleted(
     assert (made / "notes.txt").exists()
 
 
+@pytest.mark.parametrize("name", ["../{}/mine.png", "{}/mine.png", "way/mine.png", "link.png", "notes.txt"])
+def test_only_images_below_the_folder_are_deleted(
+    name: str, made: Path, call: Call, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Where a stale output names them, and the record says that a run copied them."""
+    outside = tmp_path_factory.mktemp("outside")
+    for path in (outside / "mine.png", made / "notes.txt"):
+        path.write_bytes(b"mine")
+    (made / "way").symlink_to(outside)
+    (made / "link.png").symlink_to(outside / "mine.png")
+    name = name.format(outside.name if name.startswith(".") else outside)
+    (made / "old.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": name}]}))
+    add_output(made, "old.gltf", made / "old.gltf")
+    record, found = made / CACHE / "outputs.json", (made / name).stat()
+    content = json.loads(record.read_text())
+    content["copies"] = {str(made): {name: [found.st_size, found.st_mtime_ns]}}
+    record.write_text(json.dumps(content))
+    assert "(old.gltf): deleted\n" in call("run", "--delete-stale").err
+    assert (outside / "mine.png").exists()
+    assert (made / "link.png").is_symlink()
+    assert (made / "notes.txt").exists()
+
+
 @pytest.mark.parametrize("name", ["", "journal.jsonl", "outputs.json", "objects", "results"])
 @pytest.mark.parametrize("args", [(), ("--resume",)])
 def test_nothing_is_written_through_links_of_the_cache(

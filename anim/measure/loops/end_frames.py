@@ -55,7 +55,8 @@ def find_end_frames(
     """
     if not len(skin.points):
         return [None] * len(clips)
-    ranges = [_whole_range(clip, root) for clip, root in zip(clips, roots, strict=True)]
+    rates = {clip.time_axes: loop_frame_rate(clip) for clip in {each.time_axes: each for each in clips}.values()}
+    ranges = [_whole_range(clip, rates[clip.time_axes], root) for clip, root in zip(clips, roots, strict=True)]
     size = skin.size
     missing = [i for i, gap in enumerate(gaps) if ranges[i].frame and gap > VISIBLE_GAP_PER_SIZE * size]
     duplicate = [i for i, gap in enumerate(gaps) if _may_be_duplicate(ranges[i]) and gap <= NOISE_PER_SIZE * size]
@@ -67,8 +68,8 @@ def find_end_frames(
     ]
 
 
-def _whole_range(clip: Clip, root: int) -> LoopRange:
-    return LoopRange(clip, clip.start, clip.end, frame_duration(loop_frame_rate(clip), clip.start, clip.end), root)
+def _whole_range(clip: Clip, fps: float, root: int) -> LoopRange:
+    return LoopRange(clip, clip.start, clip.end, frame_duration(fps, clip.start, clip.end), root)
 
 
 def _may_be_duplicate(whole: LoopRange) -> bool:
