@@ -20,7 +20,7 @@ from anim.measure.error.surface import diagonal
 from anim.measure.inspect.contents import FileContents
 from anim.measure.inspect.report import ClipReport, Facts
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.end_frames import EndFrame, find_end_frames
+from anim.measure.loops.end_frames import EndFrame, EndFrameKind, find_end_frames
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Interpolation, Scene, Skeleton, Track
 from anim.sampling.pose import rest_world
@@ -161,13 +161,21 @@ class CheckedFile:
         return [each for each in clips if each[1].tracks]
 
     @cached_property
-    def end_frames(self) -> dict[int, EndFrame]:
-        """Last frames of loops that are missing or duplicate, by index of the clip."""
+    def missing_frames(self) -> dict[int, EndFrame]:
+        """Last frames of loops that are missing, by index of the clip."""
+        return self._end_frames(EndFrameKind.MISSING)
+
+    @cached_property
+    def duplicate_frames(self) -> dict[int, EndFrame]:
+        """Last frames of loops that are duplicate, by index of the clip."""
+        return self._end_frames(EndFrameKind.DUPLICATE)
+
+    def _end_frames(self, kind: EndFrameKind) -> dict[int, EndFrame]:
         first = first_equal([(clip,) for _, clip in self.clips])
         distinct = [self.clips[n] for n in sorted(set(first))]
         roots = [root_motion_node(self.skeleton, clip) for _, clip in distinct]
         gaps = [report.seam_m for report, _ in distinct]
-        found = find_end_frames(self.motion, [clip for _, clip in distinct], roots, gaps)
+        found = find_end_frames(self.motion, [clip for _, clip in distinct], roots, gaps, (kind,))
         frames = {report.index: frame for (report, _), frame in zip(distinct, found, strict=True)}
         numbers = ((report.index, self.clips[first[n]][0].index) for n, (report, _) in enumerate(self.clips))
         return {number: frame for number, equal in numbers if (frame := frames[equal]) is not None}

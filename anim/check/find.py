@@ -49,5 +49,5 @@ def occurrences(
     for rule in selection.rules():
         if rule.is_costly and not costly:
             continue
-        if found := list(rule.find(file, selection.values(rule))):
+        if found := rule.occurrences(file, selection.values(rule), costly=costly):
             yield rule, found

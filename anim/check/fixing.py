@@ -83,7 +83,7 @@ class _Fixer:
         """Apply each fix once; return whether the file changed."""
         before = self.file.document
         for rule in self._rules():
-            found = list(rule.find(self.file, self.selection.values(rule)))
+            found = rule.occurrences(self.file, self.selection.values(rule))
             if found:
                 try:
                     self._apply(rule, found)

@@ -64,7 +64,8 @@ class Rule(NamedTuple):
     advice: the remedy, with {fps}, {finer}, {blend} and {clips} for a command on these clips (see
     `advice.clip_advice`), or "" if each occurrence has its own.
     is_default: False for rules that only `--select` turns on.
-    is_costly: True for rules that sample whole clips; `inspect` leaves them to `check`.
+    is_costly: True for rules that sample whole clips; `inspect` leaves them to `check`, as it does the occurrences of
+    `find_costly`.
     targets: severities for players named by `--target`. texts: parameters that are regular expressions.
     """
 
@@ -80,6 +81,7 @@ class Rule(NamedTuple):
     parameters: Mapping[str, Parameter] = _NONE
     is_default: bool = True
     is_costly: bool = False
+    find_costly: Callable[[CheckedFile, Parameters], Iterable[Occurrence]] | None = None
     targets: Mapping[str, Severity] = _NONE
     texts: Mapping[str, TextParameter] = _NONE
 
@@ -87,6 +89,13 @@ class Rule(NamedTuple):
         """Return the default of each parameter."""
         numbers = {name: each.default for name, each in self.parameters.items()}
         return Parameters(numbers, {name: each.default for name, each in self.texts.items()}, target)
+
+    def occurrences(self, file: CheckedFile, parameters: Parameters, *, costly: bool = True) -> list[Occurrence]:
+        """Return the occurrences in a file; those of `find_costly` only if `costly`."""
+        found = list(self.find(file, parameters))
+        if costly and self.find_costly is not None:
+            found += self.find_costly(file, parameters)
+        return found
 
     def finding(self, found: Sequence[Occurrence], clips: Sequence[ClipReport], severity: Severity) -> Finding:
         """Return one finding for some occurrences (one or more). clips: of the file, for advice."""

@@ -14,8 +14,9 @@ MAX_BLOCK_KEYS = 1 << 17  # of the tracks of a table, unless one has more: tempo
 
 
 class TrackTable(NamedTuple):
-    """Keys of T tracks with a node, S in all: R runs, one after the other; tracks that share their keys have one run.
+    """Keys of T tracks with a node, S in all: R runs, one after the other.
 
+    Tracks that share their keys have one run, if there are many keys.
     clips, nodes, runs: (T,), with the index of each track's run. starts, counts: (R,) of keys.
     values: (S, C). times: (S,) s.
     """
@@ -88,6 +89,9 @@ def track_tables(found: Sequence[tuple[int, Track]], path: str) -> Iterator[Trac
 
     path: not "weights", whose width differs.
     """
+    if found and _num_keys(found) <= MAX_BLOCK_KEYS:
+        yield track_table(found, path)
+        return
     block: list[tuple[int, Track]] = []
     seen: set[Identity] = set()
     size = 0
@@ -106,14 +110,10 @@ def track_tables(found: Sequence[tuple[int, Track]], path: str) -> Iterator[Trac
 
 def track_table(found: Sequence[tuple[int, Track]], path: str) -> TrackTable:
     """Return one table of all tracks, otherwise as `track_tables`."""
-    runs: dict[Identity, int] = {}
-    chosen: list[Track] = []
-    numbers = []
-    for _, track in found:
-        number = runs.setdefault(_identity(track), len(chosen))
-        if number == len(chosen):
-            chosen.append(track)
-        numbers.append(number)
+    if _num_keys(found) <= MAX_BLOCK_KEYS:  # to know which tracks share keys takes longer than to look at all
+        chosen, numbers = [track for _, track in found], list(range(len(found)))
+    else:
+        chosen, numbers = _distinct_runs(found)
     counts = np.array([len(track.values) for track in chosen], np.int64)
     return TrackTable(
         np.array([clip for clip, _ in found], np.int64),
@@ -124,6 +124,23 @@ def track_table(found: Sequence[tuple[int, Track]], path: str) -> TrackTable:
         np.concatenate([track.values for track in chosen]) if chosen else np.zeros((0, 4 if path == "rotation" else 3)),
         np.concatenate([track.times for track in chosen]) if chosen else np.zeros(0),
     )
+
+
+def _num_keys(found: Sequence[tuple[int, Track]]) -> int:
+    return sum(len(track.values) for _, track in found)
+
+
+def _distinct_runs(found: Sequence[tuple[int, Track]]) -> tuple[list[Track], list[int]]:
+    """One track of each that share their keys, and for every track the index of that one."""
+    runs: dict[Identity, int] = {}
+    chosen: list[Track] = []
+    numbers = []
+    for _, track in found:
+        number = runs.setdefault(_identity(track), len(chosen))
+        if number == len(chosen):
+            chosen.append(track)
+        numbers.append(number)
+    return chosen, numbers
 
 
 def _identity(track: Track) -> Identity:

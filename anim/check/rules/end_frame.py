@@ -24,15 +24,22 @@ MAX_DEVIATION_FRAMES = 0.1  # of a key from the frame that it represents
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
-    """Yield the clips."""
-    frames = file.end_frames
-    missing = [i for i, frame in frames.items() if frame.kind is EndFrameKind.MISSING]
-    gaps = gaps_by_clip(file, missing)
-    for i, frame in frames.items():
-        clip, joints = file.contents.clips[i], gaps.get(i)
-        node = joints[0].node if joints else None
-        found = file.in_clip(i, value=frame.gap / file.diagonal, problem=frame.kind, time_s=clip.end, node=node)
-        yield found if i in gaps else replace(found, advice=_removal(i, frame_before(clip, frame)))
+    """Yield the clips without their last frame."""
+    gaps = gaps_by_clip(file, list(file.missing_frames))
+    for i, frame in file.missing_frames.items():
+        node = gaps[i][0].node if gaps[i] else None
+        yield _in_clip(file, i, frame, node)
+
+
+def find_duplicates(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
+    """Yield the clips with two last frames."""
+    for i, frame in file.duplicate_frames.items():
+        yield replace(_in_clip(file, i, frame, None), advice=_removal(i, frame_before(file.contents.clips[i], frame)))
+
+
+def _in_clip(file: CheckedFile, number: int, frame: EndFrame, node: int | None) -> Occurrence:
+    end = file.contents.clips[number].end
+    return file.in_clip(number, value=frame.gap / file.diagonal, problem=frame.kind, time_s=end, node=node)
 
 
 def _removal(number: int, end: float) -> str:
@@ -49,8 +56,9 @@ def problem(found: Sequence[Occurrence]) -> str:
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document with the first pose as a last frame of these clips, or without their last frame."""
+    frames = {**file.missing_frames, **file.duplicate_frames}
     clips = {each.number: file.contents.clips[each.number] for each in found}
-    return replace_clips(file, {i: _corrected(clip, file.end_frames[i], file) for i, clip in clips.items()})
+    return replace_clips(file, {i: _corrected(clip, frames[i], file) for i, clip in clips.items()})
 
 
 def _corrected(clip: Clip, frame: EndFrame, file: CheckedFile) -> Clip:
@@ -79,5 +87,6 @@ RULE = Rule(
     find,
     problem,
     ADVICE[LoopKind.OPEN_BY_ONE_FRAME],
+    find_costly=find_duplicates,
     fix=Fix("add the first pose as a frame, or remove the second one", fix, is_safe=False),
 )

@@ -37,7 +37,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         and sizes[clip.index] > parameters["gap"]
         and clip.duration_s > 0
     ]
-    found = [clip for clip in found if clip.index not in file.end_frames]
+    found = [clip for clip in found if clip.index not in file.missing_frames]
     gaps = gaps_by_clip(file, [clip.index for clip in found if clip.seam_measured_on == "skin"])
     for clip in found:
         joints = gaps.get(clip.index)

@@ -8,8 +8,8 @@ from anim.arrays import Identity
 from anim.memory import MemoryBudget
 from anim.model import Clip, Track
 
-# Bytes of memory (of `to-euler`, which takes the most), which stand for time too: in a second, the error of 100 000 keys
-# is measured, or a million inspected.
+# Bytes of memory (of `to-euler`, which takes the most), which stand for time too: in a second, the error of 100 000
+# keys is measured, or a million inspected.
 BYTES_PER_EDITED_KEY = 448
 BYTES_PER_INSPECTED_KEY = 96
 

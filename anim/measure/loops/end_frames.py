@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -45,13 +45,18 @@ class EndFrame(NamedTuple):
 
 
 def find_end_frames(
-    skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int], gaps: Sequence[float]
+    skin: SkinMotion,
+    clips: Sequence[Clip],
+    roots: Sequence[int],
+    gaps: Sequence[float],
+    kinds: Collection[EndFrameKind] = tuple(EndFrameKind),
 ) -> list[EndFrame | None]:
     """Return the fault of the last frame of each clip, None without one.
 
     Missing: `analyze_loop` calls the clip open by one frame, with a visible gap; the motion inside is not sampled.
     Duplicate: two frames at the end have the pose of the first one, and the clip moves visibly before and after them.
     roots: nodes of root motion by clip, −1 for none. gaps: loop gaps in m, as `measure_seams` returns them.
+    kinds: those that are looked for.
     """
     if not len(skin.points):
         return [None] * len(clips)
@@ -60,10 +65,13 @@ def find_end_frames(
     size = skin.size
     missing = [i for i, gap in enumerate(gaps) if ranges[i].frame and gap > VISIBLE_GAP_PER_SIZE * size]
     duplicate = [i for i, gap in enumerate(gaps) if _may_be_duplicate(ranges[i]) and gap <= NOISE_PER_SIZE * size]
-    kinds = dict.fromkeys(_with(missing, _are_missing, skin, ranges), EndFrameKind.MISSING)
-    kinds |= dict.fromkeys(_with(duplicate, _are_duplicate, skin, ranges), EndFrameKind.DUPLICATE)
+    found: dict[int, EndFrameKind] = {}
+    if EndFrameKind.MISSING in kinds:
+        found |= dict.fromkeys(_with(missing, _are_missing, skin, ranges), EndFrameKind.MISSING)
+    if EndFrameKind.DUPLICATE in kinds:
+        found |= dict.fromkeys(_with(duplicate, _are_duplicate, skin, ranges), EndFrameKind.DUPLICATE)
     return [
-        EndFrame(kinds[i], each.frame, gap) if i in kinds else None
+        EndFrame(found[i], each.frame, gap) if i in found else None
         for i, (each, gap) in enumerate(zip(ranges, gaps, strict=True))
     ]
 

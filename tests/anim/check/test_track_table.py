@@ -54,7 +54,8 @@ def test_a_table_without_tracks() -> None:
     assert not list(track_tables([], "rotation"))
 
 
-def test_tracks_that_share_their_keys_have_them_once() -> None:
+def test_tracks_that_share_their_keys_have_them_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("anim.check.track_table.MAX_BLOCK_KEYS", 10)
     clips = [(clip, track.on_node(node)) for clip, node in ((0, 3), (1, 4), (1, 5)) for _, track in TRACKS[:2]]
     shared, own = track_table(clips, "scale"), track_table([(clip, _copy(track)) for clip, track in clips], "scale")
     assert (len(shared.values), len(own.values)) == (14, 42)
