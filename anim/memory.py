@@ -78,6 +78,10 @@ class MemoryBudget:
         self._sum += size
         self.check(0)
 
+    def has_room(self, size: int) -> bool:
+        """Return whether the sum and `size` more bytes are within the limit."""
+        return self._sum + size <= self.limit
+
     def check(
         self, size: int, what: str = "decoded data", *, help: str = "raise `memory_limit`, or split the file"
     ) -> None:
@@ -85,6 +89,6 @@ class MemoryBudget:
 
         what: takes these bytes; for the message. help: the way out.
         """
-        if self._sum + size > self.limit:
+        if not self.has_room(size):
             taken, limit = (f"{each / 1e9:.3g} GB" for each in (self._sum + size, self.limit))
             raise UnsupportedError(f"{what} would take {taken} or more (limit {limit})", help=help)

@@ -41,15 +41,19 @@ class Accessors:
         other._given = {**self._given, **given}
         return other
 
-    def check_total(self, indices: Iterable[int]) -> None:
-        """Raise UnsupportedError if these accessors, each once, would take more memory than the limit allows."""
+    def check_total(self, indices: Iterable[int]) -> int:
+        """Return the bytes of these accessors as float64, each once.
+
+        Raises UnsupportedError if they would take more memory than the limit allows.
+        """
         chosen = {index for index in indices if index not in self._given}
         described = [self._accessors[i] for i in chosen]
-        total = 8 * sum([about["count"] * _components(about["type"]) for about in described])
+        total: int = 8 * sum([about["count"] * _components(about["type"]) for about in described])
         views = {about["bufferView"] for about in described if "bufferView" in about} - self._bytes.keys()
         extended = [view for view in map(self._views.__getitem__, views) if "extensions" in view]
         packed = filter(None, map(buffer_layout.compression, extended))
         self.budget.check(total + sum(each["count"] * each["byteStride"] for each in packed))
+        return total
 
     def check_keys(self, indices: Iterable[int]) -> None:
         """Raise UnsupportedError as `check_total`, and if keys that no bytes of their own back would take too much.
@@ -58,7 +62,8 @@ class Accessors:
         that tools export have none, and their keys are as many as their bytes.
         """
         chosen = set(indices) - self._given.keys()
-        self.check_total(chosen)
+        if self.budget.has_room(BYTES_PER_UNBACKED_BYTE * self.check_total(chosen)):
+            return
         described = [self._accessors[i] for i in chosen]
         self.budget.check(
             BYTES_PER_UNBACKED_BYTE * unbacked_bytes(described, self._views, self._document.buffers),
