@@ -78,7 +78,7 @@ class MemoryBudget:
         self._sum += size
         self.check(0)
 
-    def has_room(self, size: int) -> bool:
+    def is_within(self, size: int) -> bool:
         """Return whether the sum and `size` more bytes are within the limit."""
         return self._sum + size <= self.limit
 
@@ -89,6 +89,6 @@ class MemoryBudget:
 
         what: takes these bytes; for the message. help: the way out.
         """
-        if not self.has_room(size):
+        if not self.is_within(size):
             taken, limit = (f"{each / 1e9:.3g} GB" for each in (self._sum + size, self.limit))
             raise UnsupportedError(f"{what} would take {taken} or more (limit {limit})", help=help)

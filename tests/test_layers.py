@@ -101,7 +101,9 @@ PUBLIC = {
         "whole_scene"
     ),
     "measure.inspect": ("contents frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"),
-    "measure.loops": "clip_ends divided_ranges end_frames joint_gaps loop_analysis recommendations skin_motion",
+    "measure.loops": (
+        "clip_ends divided_ranges end_frames joint_gaps loop_analysis loop_kind recommendations skin_motion"
+    ),
     "optimization.search": "plan",
     "optimization.tracks": "clip_ends needed_keys",
     "show.filmstrip": "camera clips filmstrip frame_selection image_file",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from anim.measure.loops.loop_analysis import Loop, LoopKind
+from anim.measure.loops.loop_analysis import Loop
+from anim.measure.loops.loop_kind import LoopKind
 from anim.model import Clip
 from anim.operations.loop import append_first_frame, loop, open_tracks
 from anim.operations.selection import track_indices

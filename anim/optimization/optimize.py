@@ -84,7 +84,7 @@ def optimize(
     verdicts = {number: each.verdict for number, each in found.items()}
     without_loss = [number for number, each in found.items() if each.without_loss]
     new = write_solutions(base.document if base else document, solutions, request.packing)
-    read_back = reader.clips(new)
+    read_back = reader.clips(new, limited=False)
     for number in changed_clips(read_back, solutions):
         (verdicts[number],) = optimizer.verify([VerificationRequest(number, read_back[number])])
     done = writing.add_mark(new, read_back, _options(request, chosen))

@@ -66,7 +66,7 @@ class StepwiseLimit:
         """Return the step that a binary search ends at; the last one is taken to fit.
 
         It asks for the same steps in the same order whatever the limit, up to the first other answer: so a larger limit
-        has no larger bound, though sizes rise and fall.
+        seldom has a larger bound, though sizes rise and fall.
         """
         low, high = first - 1, last
         while high - low > 1:

@@ -13,7 +13,8 @@ from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.measure.equal_clips import first_equal, repeat_change
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.loop_analysis import Loop, LoopKind, analyze_loops, best_ranges
+from anim.measure.loops.loop_analysis import Loop, analyze_loops, best_ranges
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.recommendations import recommend
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene

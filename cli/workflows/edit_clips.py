@@ -134,7 +134,7 @@ def edit_together(
         for note in notes({i: clips[i] for i in new}, new):
             reporter.info(f"note: {note}")
         result = writer.replace_clips(document, new)
-        written = reader.clips(result)
+        written = reader.clips(result, limited=False)
         edited = EditResult({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
         if not new:
             pass

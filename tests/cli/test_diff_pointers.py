@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import anim
+from anim.model import Track
 from fixtures.document import Channel, add_clip, add_node, start
 from tests.cli.conftest import Call
 from tests.files import glb_of, opened_path
@@ -64,6 +66,36 @@ def test_a_lost_track_that_shows_the_same_is_none(call: Call, tmp_path: Path) ->
     gone = edited(still, tmp_path / "gone.glb", lambda json: json["materials"][0].clear())
     assert call("diff", still, gone, "--fail-above", "0").code == 0
     assert call("diff", a, a, "--fail-above", "0").code == 0
+
+
+@pytest.mark.parametrize("factor", [0.1, 1 / 3])
+def test_numbers_of_the_json_are_rounded_as_keys_are(factor: float, call: Call, tmp_path: Path) -> None:
+    a = glowing(tmp_path / "a.glb", EMISSIVE, emissiveFactor=[factor, factor, factor])
+    still = edited(a, tmp_path / "still.glb", drop_colors)
+
+    def hold(each: Track) -> Track:
+        return replace(each, values=np.full_like(each.values, np.float32(factor))) if each.pointer else each
+
+    constant = anim.load(a).map_clips(lambda clip: replace(clip, tracks=tuple(map(hold, clip.tracks))))
+    constant.save(tmp_path / "constant.glb")
+    assert call("diff", tmp_path / "constant.glb", still, "--fail-above", "0").code == 0
+
+
+@pytest.mark.parametrize("value", [[10**400, 0, 0], [1e300, 0, 0], [True, None, 0], "red"])
+def test_a_value_that_no_track_can_have_is_not_known(value: object, call: Call, tmp_path: Path) -> None:
+    a = glowing(tmp_path / "a.glb", EMISSIVE, emissiveFactor=[0, 0, 0])
+    b = edited(a, tmp_path / "b.glb", drop_colors)
+    edited(b, b, lambda json: json["materials"][0].update(emissiveFactor=value))
+    run = call("diff", a, b)
+    assert run.code in (0, 3), run.err
+    assert "Traceback" not in run.err
+
+
+def test_defaults_of_other_vendors_are_not_known(call: Call, tmp_path: Path) -> None:
+    pointer = "/materials/0/extensions/ACME_light/color"
+    a = glowing(tmp_path / "a.glb", pointer, extensions={"ACME_light": {}})
+    b = edited(a, tmp_path / "b.glb", drop_colors)
+    assert "without a known value in the other: not measured" in call("diff", a, b).err
 
 
 def test_a_value_that_is_not_known_is_a_warning(call: Call, tmp_path: Path) -> None:

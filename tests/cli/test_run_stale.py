@@ -62,6 +62,27 @@ def test_a_mistyped_pattern_deletes_nothing(made: Path, call: Call) -> None:
     assert outputs(made) == before
 
 
+def test_outputs_of_settings_that_were_renamed_are_stale(made: Path, call: Call) -> None:
+    write_crowd(made, cube="morph_cube")
+    call("run").product()
+    (made / "gltf-anim.toml").rename(made / "anim.toml")
+    (made / "crowd/cube.glb").unlink()
+    assert "(build/crowd/cube.glb): deleted" in call("run", "--config", "anim.toml", "--delete-stale").err
+
+
+def test_the_record_has_outputs_as_the_last_run_wrote_them(made: Path, call: Call) -> None:
+    """Also after a run that was ended before it could save them, and with outputs that are deleted."""
+    write_crowd(made, cube="morph_cube")
+    call("run").product()
+    record = made / ".gltf-anim-cache/outputs.json"
+    record.unlink()
+    write_crowd(made, hero="arm")
+    (made / "crowd/cube.glb").unlink()
+    assert "deleted" in call("run", "--delete-stale").err
+    ((name, (_, (size, _), _)),) = json.loads(record.read_text())["folders"][str(made)].items()
+    assert (name, size) == ("build/crowd/hero.glb", (made / name).stat().st_size)
+
+
 @pytest.mark.parametrize("is_saved", [True, False])
 def test_outputs_of_other_settings_in_the_folder_are_not_stale(is_saved: bool, made: Path, call: Call) -> None:
     """Nor are they inputs of their own recipe. It deleted them, and two settings deleted each other's outputs."""
@@ -256,6 +277,13 @@ def name_below(made: Path) -> None:
     shutil.copy(made / "build/b.bin", made / "crowd/b.bin")
 
 
+def name_from_beside(made: Path) -> None:
+    """A glTF in another folder of the settings, which no run knows, names it."""
+    (made / "levels").mkdir()
+    text = '{"asset": {"version": "2.0"}, "images": [{"uri": "../build/skins/own.png"}]}'
+    (made / "levels/level.gltf").write_text(text)
+
+
 def link_to_it(made: Path) -> None:
     (made / "build/link.png").symlink_to("skins/own.png")
 
@@ -279,7 +307,16 @@ def break_other(made: Path) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [change_image, replace_image_before, name_in_other, name_below, link_to_it, name_as_input, break_other],
+    [
+        change_image,
+        replace_image_before,
+        name_in_other,
+        name_below,
+        name_from_beside,
+        link_to_it,
+        name_as_input,
+        break_other,
+    ],
 )
 def test_images_that_others_may_need_are_not_deleted(
     change: Callable[[Path], None], pictured: Path, call: Call

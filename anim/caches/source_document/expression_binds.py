@@ -20,7 +20,7 @@ def drop_binds(json: Json, source: Json, nodes: Collection[int]) -> None:
 
     def is_kept(bind: Json) -> bool:
         if "node" in bind:
-            return bind["node"] not in nodes
+            return not isinstance(bind["node"], int) or bind["node"] not in nodes
         i = bind.get("mesh")
         return not (isinstance(i, int) and 0 <= i < len(old)) or meshes[i] is old[i]
 
@@ -66,8 +66,10 @@ def _expressions(extension: object) -> Iterator[tuple[str, str, Json]]:
 
 def _edit_groups(extension: Json, is_kept: Callable[[Json], bool]) -> Json:
     """The extension VRM without binds that are not kept."""
-    groups = _groups(extension)
-    new = [_without(group, _MORPHS_0, is_kept) for group in groups]
+    if not _groups(extension):
+        return extension
+    groups = extension["blendShapeMaster"]["blendShapeGroups"]
+    new = [_without(each, _MORPHS_0, is_kept) if isinstance(each, dict) else each for each in groups]
     if all(a is b for a, b in zip(groups, new, strict=True)):
         return extension
     return {**extension, "blendShapeMaster": {**extension["blendShapeMaster"], "blendShapeGroups": new}}

@@ -16,7 +16,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.end_frames import EndFrame, EndFrameKind
-from anim.measure.loops.loop_analysis import LoopKind
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.recommendations import ADVICE
 from anim.model import Clip
 

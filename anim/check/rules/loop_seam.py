@@ -17,7 +17,7 @@ from anim.measure.inspect.root_motion import root_motion_node
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.divided_ranges import measure_on_parts
 from anim.measure.loops.joint_gaps import JointGap, joint_gaps
-from anim.measure.loops.loop_analysis import LoopKind, analyze_loop
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.recommendations import ADVICE, BLEND_S, blend_duration
 from anim.model import Clip
 from anim.units import format_number
@@ -69,7 +69,8 @@ def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) 
 
 
 def _close(clip: Clip, file: CheckedFile) -> Clip:
-    from anim.operations.close_loop import close_loop  # only fixes import operations
+    from anim.measure.loops.loop_analysis import analyze_loop
+    from anim.operations.close_loop import close_loop  # only fixes import these
 
     root = root_motion_node(file.skeleton, clip)
     fps = _frame_rate(clip)

@@ -62,7 +62,7 @@ class Accessors:
         that tools export have none, and their keys are as many as their bytes.
         """
         chosen = set(indices) - self._given.keys()
-        if self.budget.has_room(BYTES_PER_UNBACKED_BYTE * self.check_total(chosen)):
+        if self.budget.is_within(BYTES_PER_UNBACKED_BYTE * self.check_total(chosen)):
             return
         described = [self._accessors[i] for i in chosen]
         self.budget.check(

@@ -52,11 +52,12 @@ def _skeleton(document: Document, parents: Sequence[int]) -> Skeleton:
     )
 
 
-def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip, ...]:
+def clips(document: Document, accessors: Accessors | None = None, *, limited: bool = True) -> tuple[Clip, ...]:
     """Return the animations of the file in its order, without channels that have no target.
 
-    Channels without a target are ignored as glTF requires. Raises FormatError with clip, track and target for the first
-    fault.
+    Channels without a target are ignored as glTF requires. limited: whether keys that many tracks share are limited;
+    not in a document that was just written, whose source was. Raises FormatError with clip, track and target for the
+    first fault.
     """
     _check(document)
     accessors = accessors or Accessors(document)
@@ -64,7 +65,8 @@ def clips(document: Document, accessors: Accessors | None = None) -> tuple[Clip,
     with np.errstate(invalid="ignore"):  # a signaling NaN; tracks refuse any NaN
         reader = animations.Reader(document, accessors)
         found = tuple(_clip(i, each, reader) for i, each in enumerate(json_array(document.json, "animations")))
-    check_repeated_keys(found, accessors.budget)
+    if limited:
+        check_repeated_keys(found, accessors.budget)
     return found
 
 

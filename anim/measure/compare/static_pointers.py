@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,8 @@ DEFAULTS = {
     "visible": 1.0,
 }
 
+MAX_SINGLE = float(np.finfo(np.float32).max)
+
 
 def add_static_pointers(clip: Clip, other: Clip, json: Json | None) -> tuple[Clip, tuple[str, ...]]:
     """Return the clip with constant tracks of the pointers that only `other` animates, and those without a known value.
@@ -67,7 +70,8 @@ def _is_property(track: Track) -> bool:
 
 
 def _constant(track: Track, value: Floats) -> Track:
-    return Track(None, "pointer", Interpolation.STEP, track.times[:1], value[None], pointer=track.pointer)
+    stored = value.astype(np.float32).astype(np.float64)  # as the keys of a track are
+    return Track(None, "pointer", Interpolation.STEP, track.times[:1], stored[None], pointer=track.pointer)
 
 
 def _value(json: Json, track: Track) -> Floats | None:
@@ -82,9 +86,15 @@ def _value(json: Json, track: Track) -> Floats | None:
             found = found[name]
         else:
             is_object = isinstance(found, dict) and depth > 1  # of an array's element that the file has
-            default = DEFAULTS.get(names[-1]) if is_object else None
+            default = DEFAULTS.get(names[-1]) if is_object and _has_defaults(names) else None
             return None if default is None else np.full(count, default)
     numbers = found if isinstance(found, list) else [found]
-    if len(numbers) != count or not all(isinstance(each, (int, float)) for each in numbers):
+    if len(numbers) != count or not all(isinstance(each, (int, float)) and abs(each) <= MAX_SINGLE for each in numbers):
         return None
     return np.array(numbers, np.float64)
+
+
+def _has_defaults(names: list[str]) -> bool:
+    """Return whether a property is of glTF or of a Khronos extension: others have defaults of their own."""
+    extensions = [after for name, after in pairwise(names) if name == "extensions"]
+    return all(each.startswith("KHR_") for each in extensions)

@@ -165,10 +165,11 @@ def _fold(surface: Surface, skeleton: ReducedSkeleton) -> Surface:
     anchors = skeleton.anchors[surface.nodes]
     nodes = np.flatnonzero(np.bincount(anchors))
     to_anchor = matrix.multiply(skeleton.offsets[surface.nodes], surface.bind)
+    points = matrix.apply(to_anchor[surface.joints], surface.points[:, None, None])[:, :, 0]
     return surface._replace(
         nodes=nodes,
         bind=np.broadcast_to(IDENTITY, (len(nodes), 3, 4)),
-        points=matrix.apply(to_anchor[surface.joints], surface.points[:, None, None])[:, :, 0],
+        points=points[:, 0] if points.shape[1] == 1 else points,  # which may be rigid now
         joints=np.searchsorted(nodes, anchors)[surface.joints],
         owner=int(skeleton.anchors[surface.owner]),
     )

@@ -7,7 +7,7 @@ the length of a clip.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache, cached_property, partial
+from functools import cached_property
 from itertools import starmap
 from typing import NamedTuple
 
@@ -222,7 +222,7 @@ class ErrorMetric:
 
     @cached_property
     def _find_still_weights(self) -> Callable[[int], Bools]:
-        return cache(partial(find_still_weights, self.scene))
+        return find_still_weights(self.scene)
 
     def _blocks_of_players(self, before: Clip, after: Clip, times: Floats, players: Sequence[str]) -> Iterator[Block]:
         """Yield blocks of `times` (F,) in s, with both clips posed by every player in turn."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 
 import numpy as np
 
@@ -49,10 +50,19 @@ def still_weight_error(
     return worst, where
 
 
-def find_still_weights(scene: Scene, node: int) -> Bools:
-    """Return the mask (M,) of the morph weights of a node that move no vertex; empty without morph targets."""
-    found = next((each.mesh.targets for each in scene.instances if each.node == node), np.empty((0, 0, 3)))
-    return np.asarray(~found.any(axis=(1, 2)))
+def find_still_weights(scene: Scene) -> Callable[[int], Bools]:
+    """Return a function that gives the mask (M,) of the morph weights of a node that move no vertex.
+
+    It is empty without morph targets.
+    """
+    meshes = {each.node: each.mesh for each in reversed(scene.instances)}
+
+    @cache
+    def of_node(node: int) -> Bools:
+        targets = meshes[node].targets if node in meshes else np.empty((0, 0, 3))
+        return np.asarray(~targets.any(axis=(1, 2)))
+
+    return of_node
 
 
 def _pair_weights(before: Clip, after: Clip, partners: Ints) -> Iterator[tuple[Track, Track]]:

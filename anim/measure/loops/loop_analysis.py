@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from anim.measure.loops.loop_criteria import (
     loop_frame_rate,
     open_joints,
 )
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip
@@ -33,16 +33,6 @@ MAX_COUNT = 10**12  # frames that indices in float64 tell apart
 MAX_FRAMES = 600  # frames that `best_ranges` compares
 MAX_STEPS = 300  # pairs of frames, and keys, that are measured inside a clip
 MIN_INTERIOR_S = 2e-4  # s, from an end to a key inside
-
-
-class LoopKind(StrEnum):
-    """Kind of a loop, by the difference between a clip's end and its start."""
-
-    CLOSED = "closed"
-    OPEN_BY_ONE_FRAME = "open by one frame"
-    CLOSED_EXCEPT = "closed except some joints"
-    NOT_A_LOOP = "not a loop"
-    SINGLE_POSE = "a single pose"
 
 
 @dataclass(frozen=True, slots=True)

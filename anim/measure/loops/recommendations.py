@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from anim.measure.loops.loop_analysis import Loop, LoopKind
+from anim.measure.loops.loop_kind import LoopKind
 from anim.model import Clip
+
+if TYPE_CHECKING:  # checks give the advice without the analysis
+    from anim.measure.loops.loop_analysis import Loop
 
 BLEND_S = 0.25  # s over which a gap is closed, in clips of at least four times that
 MAX_VELOCITY_GAP = 3.0  # of the median speed of the fastest vertex; a larger one is visible

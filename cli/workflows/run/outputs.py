@@ -68,8 +68,13 @@ class OutputRecord:
         source = self.outputs[name].input
         return any(matches(source, each.match) and each.output_of(source) == name for each in recipes)
 
-    def save(self, written: Mapping[str, str], copies: Iterable[str] = (), forgotten: Collection[str] = ()) -> None:
-        """Add outputs, each with its input, images and unsaved ones to the record as it is now, and remove some.
+    def is_own(self, output: RecordedOutput) -> bool:
+        """Return whether the settings of this run made an output, or some that are no longer in the folder."""
+        name = output.settings
+        return name == self.settings or bool(name and not (self.folder / name).exists())
+
+    def save(self, written: Mapping[str, str], copies: Iterable[str] = ()) -> None:
+        """Add outputs, each with its input, images and unsaved ones to the record as it is now.
 
         Another run may have added its own since this record was read. Raises OutputError.
         """
@@ -78,11 +83,19 @@ class OutputRecord:
             name: RecordedOutput(source, stamp, self.settings) for name, source, stamp in stamps if stamp is not None
         }
         copied = {name: stamp for name in copies if (stamp := stamp_of(self.folder / name)) is not None}
+        self._update({**self.unsaved, **new}, {**self.unsaved_copies, **copied})
+
+    def forget(self, names: Collection[str]) -> None:
+        """Remove outputs and images from the record as it is now. Raises OutputError."""
+        self._update({}, {}, names)
+
+    def _update(
+        self, outputs: Mapping[str, RecordedOutput], copies: Mapping[str, Stamp], forgotten: Collection[str] = ()
+    ) -> None:
         with lock_folder(self.path.parent):
             content = _read(self.path)
             known, before = _outputs_of(content, self.folder), _copies_of(content, self.folder)
-            kept = _without({**known, **self.unsaved, **new}, forgotten)
-            left = _without({**before, **self.unsaved_copies, **copied}, forgotten)
+            kept, left = _without({**known, **outputs}, forgotten), _without({**before, **copies}, forgotten)
             if (kept, left) != (known, before):
                 folders = {**content.get(FOLDERS, {}), str(self.folder): kept}
                 others = {**content.get(COPIES, {}), str(self.folder): left}

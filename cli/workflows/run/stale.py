@@ -62,11 +62,11 @@ def report_stale(
 def find_stale(record: OutputRecord, book: RecipeBook, jobs: Sequence[Job]) -> tuple[list[str], list[str]]:
     """Return the outputs of earlier runs that no job makes and that nothing here reads: unchanged and changed, sorted.
 
-    Those of other settings in the folder are left alone, whose recipes may make them; so are links, and files behind a
-    link, which may be somebody else's.
+    Those of other settings that are in the folder are left alone, whose recipes may make them; so are links, and files
+    behind a link, which may be somebody else's.
     """
     outputs = {job.output for job in jobs}
-    own = {name for name, each in record.outputs.items() if each.settings == record.settings}
+    own = {name for name, each in record.outputs.items() if record.is_own(each)}
     found = [name for name in sorted(own - outputs) if _is_plain(record.folder, name)]
     if not found:
         return [], []
@@ -123,7 +123,7 @@ def _delete(record: OutputRecord, names: Sequence[str], written: Iterable[str], 
             with suppress(OSError):  # not empty
                 for above in (folder / name).relative_to(folder).parents[:-1]:
                     (folder / above).rmdir()
-    record.save({}, forgotten=[*names, *deleted])
+    record.forget([*names, *deleted])
     return deleted
 
 

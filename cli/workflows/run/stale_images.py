@@ -30,14 +30,15 @@ class StaleImages:
         """Delete the images that are as they were copied, and that nothing else refers to; return their names.
 
         kept: files that remain and may refer to them, or are one of them: outputs, and what runs and checks read.
-        Other glTF files count in the images' folders and above, and links there. If one of all these can't be read,
-        every image remains.
+        Other glTF files count below the folder of the settings, and in the images' folders and above, with links. If
+        one of all these can't be read, every image remains.
         """
         names = [name for name in self._places if self._are_unchanged(name) and self._is_plain(name)]
         if not names:
             return []
         files = [self._folder / each for each in kept]
-        used = _references(file for file in files if file.suffix.lower() in SUFFIXES and file.exists())
+        documents = {*filter(_is_document, files), *filter(_is_document, self._folder.rglob("*"))}
+        used = _references(sorted(documents))
         near = _near(self._places[name] for name in names)
         if used is None or near is None:
             return []
@@ -53,6 +54,10 @@ class StaleImages:
             (self._folder / name).unlink()
             return True
         return False
+
+
+def _is_document(path: Path) -> bool:
+    return path.suffix.lower() in SUFFIXES and path.is_file()
 
 
 def _references(files: Iterable[Path]) -> set[str] | None:

@@ -11,8 +11,9 @@ from anim.errors import RangeError
 from anim.gltf.reading import reader
 from anim.maths import quaternion
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.loop_analysis import LoopKind, best_ranges
 from anim.measure.loops.loop_analysis import analyze_loop as judged
+from anim.measure.loops.loop_analysis import best_ranges
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene, Track
 from anim.operations.loop import append_first_frame, loop

@@ -40,6 +40,19 @@ def test_binds_of_nodes_that_stay_are_kept() -> None:
     assert edited["extensions"] == vrm_1({"isBinary": True})
 
 
+def test_what_is_no_bind_stays() -> None:
+    source: dict[str, Any] = {"meshes": [{}], "extensions": vrm_1({"morphTargetBinds": [{"node": [0]}, {"node": 0}]})}
+    edited = dict(source)
+    drop_binds(edited, source, {0})
+    assert edited["extensions"] == vrm_1({"morphTargetBinds": [{"node": [0]}]})
+    groups = [None, {"binds": [{"mesh": 0}]}]
+    source = {"meshes": [{}], "extensions": {"VRM": {"blendShapeMaster": {"blendShapeGroups": groups}}}}
+    edited = {**source, "meshes": [{"name": "baked"}]}
+    drop_binds(edited, source, {0})
+    new = edited["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"]
+    assert (len(new), new[0], new[1].get("binds", [])) == (2, None, [])
+
+
 @pytest.mark.parametrize("extension", [{}, vrm_0([]), vrm_1({}), {"VRM": 3}, {"VRM": {"blendShapeMaster": []}}])
 def test_documents_without_binds_are_unchanged(extension: dict[str, Any]) -> None:
     source: dict[str, Any] = {"meshes": [{}], "extensions": extension}

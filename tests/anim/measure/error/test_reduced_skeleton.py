@@ -158,3 +158,21 @@ def test_joints_on_one_moving_node_are_one() -> None:
     (body,) = (part for part in ErrorMetric(scene, clips=(before, after)).parts if part.name == "body")
     assert isinstance(body, SkinnedGroups)
     assert len(body.surface.nodes) <= 2 < len(scene.instances[0].skin.joints)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("width", [1, 2, 4])
+def test_errors_of_skins_on_one_moving_node(width: int) -> None:
+    """Also with one influence per vertex, where the surface is rigid then."""
+    random = np.random.default_rng(3)
+    weights = random.uniform(size=(5, width)) + 0.1
+    mesh = replace(
+        _mesh(random, "body", 8, 0),
+        joints=random.integers(0, 8, (5, width)),
+        weights=weights / weights.sum(axis=1, keepdims=True),
+    )
+    skin = Skin(np.arange(8), np.eye(4)[None, :3] + 0.3 * random.normal(size=(8, 3, 4)))
+    scene = Scene(_skeleton(random), (MeshInstance(1, mesh, skin, np.empty(0)),))
+    before, after = clip(track("translation", TIMES, np.eye(3), node=0)), clip()
+    whole, less = ErrorMetric(scene), ErrorMetric(scene, clips=(before, after))
+    for each in (whole, less):
+        assert each.error(before, after).max_error == pytest.approx(whole.error(before, after).max_error, rel=1e-9)

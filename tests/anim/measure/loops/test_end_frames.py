@@ -8,7 +8,8 @@ import pytest
 from anim.arrays import Floats
 from anim.measure.loops.clip_ends import LoopRange
 from anim.measure.loops.end_frames import EndFrame, EndFrameKind, find_end_frames
-from anim.measure.loops.loop_analysis import LoopKind, analyze_loop
+from anim.measure.loops.loop_analysis import analyze_loop
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.seam import measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Scene

@@ -15,7 +15,8 @@ from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.measure.loops import skin_motion
 from anim.measure.loops.clip_ends import LoopRange
-from anim.measure.loops.loop_analysis import LoopKind, analyze_loop, analyze_loops
+from anim.measure.loops.loop_analysis import analyze_loop, analyze_loops
+from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene
