@@ -22,6 +22,13 @@ def parse_length(text: str, option: str, diagonal: Callable[[], float]) -> float
         return units.parse_length(text, option, diagonal)
 
 
+def warn_without_unit(text: str | None, option: str, warn: Callable[[str], None]) -> None:
+    """Warn of a bound without a unit, which is in metres: --max-error 1 was likely meant as something smaller."""
+    given = (text or "").strip()
+    if given[-1:].isdigit() and not units.is_zero(given):
+        warn(f"{option} {given} means {given} m, for want of a unit (0.5mm, 0.1%)")
+
+
 def parse_angle(text: str, option: str) -> float:
     """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises UsageError otherwise."""
     with _usage_errors():

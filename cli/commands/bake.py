@@ -15,7 +15,7 @@ from anim.measure.equal_clips import first_equal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.skinning.bake import SPACES, bakeable_instances
-from cli import text
+from cli import text, units
 from cli.errors import UsageError
 from cli.io import cache_files, documents, scenes
 from cli.io.cache_folders import StagedFolder
@@ -124,6 +124,7 @@ def command(
         "rest_mesh": rest_mesh,
         "max_targets": max_targets,
     }
+    units.warn_without_unit(max_error, "--max-error", reporter.warn)
     files = FileOptions(ending, values, max_error, up, vertex_order, keep_skeleton, dry_run)
     files.check(normals=bool(normals), tangents=bool(tangents))
     if html is not None:

@@ -99,6 +99,7 @@ def command(
     players.
     """
     reporter, selection = Reporter(quiet), Selection(clip or ())
+    units.warn_without_unit(fail_above, "--fail-above", reporter.warn)
     who = _players(new, str(player), players)
     if old == new == documents.PIPE:
         raise UsageError("A and B can't both be stdin")

@@ -187,8 +187,7 @@ def command(
 
     def request(scene: Scene) -> Request:
         bounds = optimize_job.bounds(scene, lengths)
-        for words in optimize_job.notes(lengths):
-            reporter.warn(words)
+        optimize_job.warn_without_units(lengths, reporter.warn)
         nodes = optimize_job.nodes_to_keep(keep_node or (), scene)
         return Request(
             bounds,
@@ -220,7 +219,7 @@ def command(
             wanted, found = optimize_job.optimize_within(optimizer, wanted, max_count, ceiling)
             optimize_report.check(found, optimizer.clips, wanted, optimizer.scale)
             image_notes.warn_of_pipe(source.document, source.folder, output, reporter)  # the report lists warnings
-            about = optimize_outputs.describe(optimizer, wanted, found, source, output, began)
+            about = optimize_outputs.describe(optimizer, wanted, found, source, output, began, max_count)
             with (
                 optimize_outputs.write_report(about, reporter, report, dry_run=dry_run),
                 optimize_outputs.write_comparison(about, reporter, html, input, dry_run=dry_run),

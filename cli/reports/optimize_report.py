@@ -27,7 +27,7 @@ from cli.text import format_bytes, format_change, format_duration, format_fracti
 class OptimizeReport:
     """Data of the report. size_before, size_after: bytes of the files; scale: m, the diagonal.
 
-    measured_at: "surface" or, in a file without vertices, "nodes".
+    measured_at: "surface" or, in a file without vertices, "nodes". max_bytes: the limit of the file, if there is one.
     """
 
     name: str
@@ -41,6 +41,7 @@ class OptimizeReport:
     size_after: int
     seconds: float
     measured_at: str
+    max_bytes: int | None = None
 
     @property
     def unchanged(self) -> bool:
@@ -54,6 +55,8 @@ class OptimizeReport:
             return None
         if self.found.unchanged:
             return "optimized like this before"
+        if self.max_bytes is not None and self.size_before <= self.max_bytes:
+            return "it fits --max-bytes as it is, without an error (--max-error alone makes it as small as that allows)"
         kept = retained_keys(self.before, self.found.solutions)
         return f"no smaller file within the bound{'; ' if kept else ''}{kept}"
 

@@ -128,12 +128,10 @@ def raw_options(bounds: Bounds, said: Mapping[str, str | None]) -> tuple[str, ..
     return tuple(_fraction(text) or f"{getattr(bounds, name)}" for name, text in said.items())
 
 
-def notes(said: Mapping[str, str | None]) -> Iterator[str]:
-    """Yield notes on lengths without a unit, which are metres."""
+def warn_without_units(said: Mapping[str, str | None], warn: Callable[[str], None]) -> None:
+    """Warn of lengths without a unit, which are metres."""
     for name in ("max_error", "shell"):
-        text = (said[name] or "").strip()
-        if text and text[-1].isdigit() and not is_zero(text):
-            yield f"--{name.replace('_', '-')} {text} means {text} m, for want of a unit (0.5mm, 0.1%)"
+        units.warn_without_unit(said[name], f"--{name.replace('_', '-')}", warn)
 
 
 def _fraction(text: str | None) -> str:

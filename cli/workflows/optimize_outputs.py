@@ -58,9 +58,15 @@ class OptimizeOutputs:
 
 
 def describe(
-    optimizer: FileOptimizer, request: Request, found: Optimized, source: Source, output: str, began: float
+    optimizer: FileOptimizer,
+    request: Request,
+    found: Optimized,
+    source: Source,
+    output: str,
+    began: float,
+    max_bytes: int | None,
 ) -> optimize_report.OptimizeReport:
-    """Return the report on an optimization. began: s, when, by `time.perf_counter`."""
+    """Return the report on an optimization. began: s, when, by `time.perf_counter`. max_bytes: None without a limit."""
     result, size = optimizer.choose_document(found)
     return optimize_report.OptimizeReport(
         source.name if output == documents.PIPE else output,
@@ -74,6 +80,7 @@ def describe(
         size,
         time.perf_counter() - began,
         is_measured_at(optimizer.scene),
+        max_bytes,
     )
 
 

@@ -285,3 +285,13 @@ def test_one_file_as_two_players_show_it(fixture: Fixture, call: Call, tmp_path:
 )
 def test_players_that_can_t_be_compared(args: list[str], problem: str, fixture: Fixture, call: Call) -> None:
     assert problem in refusal(call("diff", fixture("arm"), *args), 2)
+
+
+@pytest.mark.parametrize("line", ["diff IN IN --fail-above 1", "bake IN out.glb --clip walk --max-error 1 --fps 4"])
+def test_a_bound_without_a_unit_is_a_warning(line: str, walk: Path, call: Call, tmp_path: Path) -> None:
+    """A limit of a metre passes everything: it was likely meant as millimetres or percent."""
+    words = [{"IN": walk, "out.glb": tmp_path / "out.glb"}.get(word, word) for word in line.split()]
+    option = next(word for word in line.split() if word.endswith(("-above", "-error")))
+    run = call(*words, "-q")
+    assert run.code == 0
+    assert f"warning: {option} 1 means 1 m, for want of a unit" in run.err

@@ -82,6 +82,14 @@ def test_a_report_says_why_nothing_changed(fixture: Fixture, tmp_path: Path, cal
     assert reasons == [None, "optimized like this before", "no smaller file within the bound"]
 
 
+def test_a_file_that_fits_its_byte_limit_says_so(walk: Path, tmp_path: Path, call: Call) -> None:
+    """And not that no smaller file is within the bound."""
+    once, again = tmp_path / "once.glb", tmp_path / "again.glb"
+    call("optimize", walk, once, "--max-error", "0", *FAST).product()
+    run = call("optimize", once, again, "--max-error", "1%", "--max-bytes", "10MB", *FAST)
+    assert "unchanged: it fits --max-bytes as it is" in run.err
+
+
 def test_the_report_on_stdout_beside_a_file(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     run = call("optimize", fixture("noop"), tmp_path / "out.glb", "--report", "-", *FAST)
     assert run.json["unchanged"] is False

@@ -188,6 +188,7 @@ def command(
             write_report(run.report, report)
         raise CheckError(excess, help=run.report.advice)
     cache = run.cache if up is None else up_axis.to_up_axis(run.cache, str(up))
+    units.warn_without_unit(max_error, "--max-error", reporter.warn)
     meters = (
         None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
     )

@@ -203,6 +203,7 @@ def command(
             end,
         )
         seconds = simulation.chosen_duration(duration, driver)
+        units.warn_without_unit(max_error, "--max-error", reporter.warn)
         chosen = replace(
             options,
             duration=seconds,

@@ -109,6 +109,7 @@ def command(
         description = replace(add_chosen(description, scene, chosen), floor=floor, floor_material=material)
         description = _with_velocities(description, scene, velocity or [])
         seconds = simulation.chosen_duration(duration, driver, simulation.RIGID_DURATION_S)
+        units.warn_without_unit(max_error, "--max-error", reporter.warn)
         error = units.parse_length(max_error, "--max-error", lambda: diagonal(scene)) if max_error else 0.0
         run = simulate_rigid_bodies(scene, driver, description, replace(options, duration=seconds, max_error=error))
         for note in run.notes:
