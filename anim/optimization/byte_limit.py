@@ -96,6 +96,9 @@ class ByteLimit:
         found = self._find_at_steps(likely) if likely and file.scale and is_small(file, self._fast) else []
         if not any(map(self._fits, found)):
             found += self._find_fitting(likely)
+        if not any(map(self._fits, found)):  # results of several searches can share less than those of one
+            results = self._file.search(self._request.with_bound(self._most), self._fast.clips)
+            found.append(self._write_results(results, self._most, self._most))
         best = min(filter(self._fits, found), key=lambda each: each.point.error, default=None)
         if best is None:
             smallest = min((*(each.point for each in found), self._fast.measure(0.0)), key=lambda point: point.size)

@@ -286,6 +286,17 @@ def test_bytes_and_error_both_count(fixture: Fixture, tmp_path: Path, call: Call
     assert not (tmp_path / "no.glb").exists()
 
 
+@pytest.mark.slow
+def test_the_size_at_the_bound_fits_for_many_clips_too(asset: Find, tmp_path: Path, call: Call) -> None:
+    """Results of several searches share less than those of one: this size was refused."""
+    at_bound, output = tmp_path / "bound.glb", tmp_path / "out.glb"
+    assert call("optimize", asset("Robot.glb"), at_bound, "--max-error", "1mm").code == 0
+    limit = at_bound.stat().st_size
+    run = call("optimize", asset("Robot.glb"), output, "--max-error", "1mm", "--max-bytes", str(limit))
+    assert run.code == 0, run.err
+    assert output.stat().st_size <= limit
+
+
 @pytest.mark.parametrize("place", ["in", "out"])
 def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
     """Also where the models' names have no ending; a dry run counts too."""
