@@ -43,7 +43,8 @@ def lost_bind_notes(before: Json, after: Json) -> tuple[str, ...]:
 
 def _binds(json: Json) -> Iterator[tuple[str, int]]:
     """The key of each expression, and its number of binds to morph targets."""
-    extensions = json.get("extensions", {})
+    extensions = json.get("extensions")
+    extensions = extensions if isinstance(extensions, dict) else {}
     for i, group in enumerate(_groups(extensions.get("VRM"))):
         yield f"VRM/{i}", len(json_array(group, _MORPHS_0))
     for kind, name, expression in _expressions(extensions.get("VRMC_vrm")):

@@ -55,8 +55,8 @@ def is_default_scene_empty(document: Document) -> bool:
 
 def faces_back(json: Json) -> bool:
     """Return whether figures look along −Z, as those of VRM 0.x do; along +Z in glTF and VRM 1.0."""
-    extensions = json.get("extensions", {})
-    return "VRM" in extensions and "VRMC_vrm" not in extensions
+    extensions = json.get("extensions")
+    return isinstance(extensions, dict) and "VRM" in extensions and "VRMC_vrm" not in extensions
 
 
 def instanced_nodes(json: Json) -> list[int]:

@@ -53,9 +53,10 @@ def test_what_is_no_bind_stays() -> None:
     assert (len(new), new[0], new[1].get("binds", [])) == (2, None, [])
 
 
-@pytest.mark.parametrize("extension", [{}, vrm_0([]), vrm_1({}), {"VRM": 3}, {"VRM": {"blendShapeMaster": []}}])
-def test_documents_without_binds_are_unchanged(extension: dict[str, Any]) -> None:
+@pytest.mark.parametrize("extension", [{}, 0.5, vrm_0([]), vrm_1({}), {"VRM": 3}, {"VRM": {"blendShapeMaster": []}}])
+def test_documents_without_binds_are_unchanged(extension: object) -> None:
     source: dict[str, Any] = {"meshes": [{}], "extensions": extension}
     edited = {**source, "meshes": [{"name": "baked"}]}
     drop_binds(edited, source, {0})
     assert edited["extensions"] is extension
+    assert not lost_bind_notes(source, edited)
