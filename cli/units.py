@@ -29,6 +29,12 @@ def warn_without_unit(text: str | None, option: str, warn: Callable[[str], None]
         warn(f"{option} {given} means {given} m, for want of a unit (0.5mm, 0.1%)")
 
 
+def parse_bound(text: str, option: str, diagonal: Callable[[], float], warn: Callable[[str], None]) -> float:
+    """Return a bound in metres as `parse_length` does; one without a unit is warned of."""
+    warn_without_unit(text, option, warn)
+    return parse_length(text, option, diagonal)
+
+
 def parse_angle(text: str, option: str) -> float:
     """Return an angle above 0 in radians from "0.05deg" or "0.001rad". Raises UsageError otherwise."""
     with _usage_errors():

@@ -70,7 +70,9 @@ def _option(option: Any, context: Any) -> str:
 def _details(option: Any, default: Any) -> Iterator[str]:
     if option.required:
         yield "required"
-    if option.show_default and default is not None and not option.is_flag:
+    if isinstance(option.show_default, str):
+        yield f"default {option.show_default}"
+    elif option.show_default and default is not None and not option.is_flag:
         yield f"default {getattr(default, 'value', default)}"
 
 

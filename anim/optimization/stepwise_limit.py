@@ -59,7 +59,7 @@ class StepwiseLimit:
             step = self._smallest_step(first, last, likely)
         for near in range(max(step - NEAR_STEPS, first), min(step + NEAR_STEPS, last) + 1):
             self._size(near)
-        self._search_plateau(step, last)
+        self._search_equal_sizes(step, last)
         self._combine()
 
     def _smallest_step(self, first: int, last: int, likely: float) -> int:
@@ -77,7 +77,7 @@ class StepwiseLimit:
                 low = middle
         return high
 
-    def _search_plateau(self, step: int, last: int) -> None:
+    def _search_equal_sizes(self, step: int, last: int) -> None:
         """Search far above a step whose result is that of many larger bounds: by chance one has less error beyond."""
         distance = 1
         while step + distance <= last and self._size(step + distance) == self._sizes[step]:
@@ -111,19 +111,20 @@ class StepwiseLimit:
 
         Likely bytes leave out what clips share, so that the next ones are tried until a file fits, as one does.
         """
-        of_clips = list(zip(*(each.values() for each in self._choices.values()), strict=True))
+        of_clips = {i: [found[i] for found in self._choices.values()] for i in next(iter(self._choices.values()))}
         step = min(self._sizes, key=lambda each: abs(self._sizes[each] - self.max_bytes))
         others = self._sizes[step] - sum(each.size for each in self._choices[step].values())
         fitting = (self._choices[each] for each, size in self._sizes.items() if size <= self.max_bytes)
         least = min((max(each.error for each in clips.values()) for clips in fitting), default=math.inf)
-        for error in sorted({choice.error for clip in of_clips for choice in clip if choice.error < least}):
-            some = [[choice for choice in clip if choice.error <= error] for clip in of_clips]
-            if not all(some):
+        errors = {choice.error for clip in of_clips.values() for choice in clip}
+        for error in sorted(each for each in errors if each < least):
+            some = {i: [choice for choice in clip if choice.error <= error] for i, clip in of_clips.items()}
+            if not all(some.values()):
                 continue
-            best = [min(clip, key=lambda each: (each.size, each.error)) for clip in some]
-            if others + sum(each.size for each in best) <= self.max_bytes:
-                results = dict(zip(self._choices[step], (each.result for each in best), strict=True))
-                if self.write(results, max(each.bound for each in best)) <= self.max_bytes:
+            best = {i: min(clip, key=lambda each: (each.size, each.error)) for i, clip in some.items()}
+            if others + sum(each.size for each in best.values()) <= self.max_bytes:
+                results = {i: each.result for i, each in best.items()}
+                if self.write(results, max(each.bound for each in best.values())) <= self.max_bytes:
                     return
 
 

@@ -124,8 +124,9 @@ def command(
             announce_compiling(reporter)
         cache = _changed(loaded.cache, at, fps, up, vertex_order)
         if max_error is not None:
-            units.warn_without_unit(max_error, "--max-error", reporter.warn)
-            given["max_error"] = units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
+            given["max_error"] = units.parse_bound(
+                max_error, "--max-error", lambda: statistics.diagonal(cache), reporter.warn
+            )
         if onto is not None:
             source = stack.enter_context(documents.source(onto, reporter))
             number = choose_clip(source, clip)

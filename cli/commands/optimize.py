@@ -135,8 +135,8 @@ def command(
         Effort | None,
         typer.Option(
             "--effort",
-            help="Search effort: more is smaller and slower.  [default: balanced; with --curve fast]",
-            show_default=False,
+            help="Search effort: more is smaller and slower.",
+            show_default="balanced; with --curve fast",
         ),
     ] = None,
     workers: Annotated[

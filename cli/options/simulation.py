@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from fractions import Fraction
@@ -13,9 +13,12 @@ from typing import Annotated
 import typer
 
 from anim.errors import RangeError
+from anim.measure.error.surface import diagonal
 from anim.model import Clip as DrivingClip
+from anim.model import Scene
 from anim.simulation.integrators import INTEGRATORS
 from anim.simulation.particles.forces import EARTH_GRAVITY_M_S2
+from cli import units
 from cli.errors import UsageError
 
 EARTH_GRAVITY = ",".join(f"{value:g}" for value in EARTH_GRAVITY_M_S2)
@@ -115,6 +118,11 @@ Name = Annotated[str, typer.Option("--name", metavar="NAME", help="Name of the n
 def chosen_duration(given: float | None, driver: DrivingClip, default: float = DEFAULT_DURATION_S) -> float:
     """Return the seconds to simulate: as given, else the length of the driving clip, else a default."""
     return given if given is not None else driver.end - driver.start or default
+
+
+def chosen_bound(given: str | None, scene: Scene, warn: Callable[[str], None]) -> float:
+    """Return the error bound in m, 0 without one; one without a unit is warned of."""
+    return 0.0 if given is None else units.parse_bound(given, "--max-error", lambda: diagonal(scene), warn)
 
 
 def check_fps(fps: float) -> None:

@@ -16,7 +16,7 @@ from anim.caches.source_document.shading_normals import with_shading_normals
 from anim.caches.transforms.resample import SAME_FRAME_TOLERANCE_S
 from anim.errors import RangeError
 from anim.gltf.document import Document
-from anim.gltf.io.source import Source, move_images
+from anim.gltf.io.source import Source, copy_external_images
 from anim.gltf.reading import reader
 from anim.gltf.writing.draco_decoding import decode_draco
 from anim.model import Clip, Scene, VertexCache
@@ -142,4 +142,4 @@ def prepare_source(document: Document, source: Source, meshes: set[int], output:
     document = decode_draco(document, meshes)
     if source.folder is None or source.is_in_folder(output.path):
         return document
-    return move_images(document, source.folder, output.path, dry_run=output.dry_run)
+    return copy_external_images(document, source.folder, output.path, dry_run=output.dry_run)

@@ -7,9 +7,11 @@ import struct
 from pathlib import Path
 from typing import Any
 
+from tests.cli.conftest import Call
 from tests.cli.running import built
 from tests.fixtures.reading import split
 
+PLAIN = ("resample --fps 12",)
 STEPS = ("resample --fps 30", "optimize --max-error 0.5mm --effort fast")
 
 
@@ -57,3 +59,18 @@ def journal(folder: Path) -> list[dict[str, Any]]:
 def statuses(folder: Path) -> dict[str, str]:
     """Status of each input in the journal."""
     return {entry["input"]: entry["status"] for entry in journal(folder)}
+
+
+def built_files(folder: Path) -> set[str]:
+    """Return the names of the files in build/."""
+    return {path.relative_to(folder).as_posix() for path in (folder / "build").rglob("*") if path.is_file()}
+
+
+def run_with_a_deleted_input(folder: Path, call: Call) -> Path:
+    """Return the folder after a run of two files, of which one input is deleted after it."""
+    write_crowd(folder, hero="biped", cube="morph_cube")
+    (folder / "crowd/arm 1.glb").unlink()
+    write_recipe(folder, *PLAIN)
+    call("run").product()
+    (folder / "crowd/cube.glb").unlink()
+    return folder

@@ -295,15 +295,3 @@ def test_the_size_at_the_bound_fits_for_many_clips_too(asset: Find, tmp_path: Pa
     run = call("optimize", asset("Robot.glb"), output, "--max-error", "1mm", "--max-bytes", str(limit))
     assert run.code == 0, run.err
     assert output.stat().st_size <= limit
-
-
-@pytest.mark.parametrize("place", ["in", "out"])
-def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
-    """Also where the models' names have no ending; a dry run counts too."""
-    source = tmp_path / "in"
-    source.write_bytes(fixture("arm").read_bytes())
-    for dry in ((), ("-n",)):
-        run = call("optimize", source, tmp_path / "out", "--report", tmp_path / "." / place, *dry, *FAST)
-        assert f"--report would replace {'OUT' if place == 'out' else 'an input'}" in refusal(run, 2)
-    assert source.read_bytes() == fixture("arm").read_bytes()
-    assert not (tmp_path / "out").exists()

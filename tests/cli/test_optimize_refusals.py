@@ -91,3 +91,15 @@ def test_the_validator_finds_no_new_errors(fixture: Fixture, tmp_path: Path, cal
     reports = validate_many([*before, *after])
     for old, new in zip(reports[: len(before)], reports[len(before) :], strict=True):
         assert set(errors(new)) <= set(errors(old))
+
+
+@pytest.mark.parametrize("place", ["in", "out"])
+def test_a_report_takes_no_models_place(place: str, fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    """Also where the models' names have no ending; a dry run counts too."""
+    source = tmp_path / "in"
+    source.write_bytes(fixture("arm").read_bytes())
+    for dry in ((), ("-n",)):
+        run = call("optimize", source, tmp_path / "out", "--report", tmp_path / "." / place, *dry, *FAST)
+        assert f"--report would replace {'OUT' if place == 'out' else 'an input'}" in refusal(run, 2)
+    assert source.read_bytes() == fixture("arm").read_bytes()
+    assert not (tmp_path / "out").exists()

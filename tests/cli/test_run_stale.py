@@ -4,40 +4,27 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Call
-from tests.cli.running import built, help_line, refusal
-from tests.cli.running_recipes import statuses, write_crowd, write_recipe
-
-PLAIN = ("resample --fps 12",)
-
-
-def outputs(folder: Path) -> set[str]:
-    return {path.relative_to(folder).as_posix() for path in (folder / "build").rglob("*") if path.is_file()}
+from tests.cli.running import help_line, refusal
+from tests.cli.running_recipes import PLAIN, built_files, run_with_a_deleted_input, statuses, write_crowd, write_recipe
 
 
 @pytest.fixture
 def made(folder: Path, call: Call) -> Path:
-    """A folder with a run of two files, of which one input is deleted after it."""
-    write_crowd(folder, hero="biped", cube="morph_cube")
-    (folder / "crowd/arm 1.glb").unlink()
-    write_recipe(folder, *PLAIN)
-    call("run").product()
-    (folder / "crowd/cube.glb").unlink()
-    return folder
+    return run_with_a_deleted_input(folder, call)
 
 
 def test_outputs_of_deleted_inputs_are_named_and_deleted(made: Path, call: Call) -> None:
     note = "note: no recipe makes 1 output of earlier runs any more (build/crowd/cube.glb): "
     for _ in range(2):
         assert f"{note}--delete-stale deletes them\n" in call("run").err
-    assert outputs(made) == {"build/crowd/hero.glb", "build/crowd/cube.glb"}
+    assert built_files(made) == {"build/crowd/hero.glb", "build/crowd/cube.glb"}
     assert f"{note}deleted\n" in call("run", "--delete-stale").err
-    assert outputs(made) == {"build/crowd/hero.glb"}
+    assert built_files(made) == {"build/crowd/hero.glb"}
     assert "note" not in call("run", "--delete-stale").err
 
 
@@ -48,18 +35,18 @@ def test_outputs_are_named_and_deleted_after_all_inputs_are_gone(made: Path, cal
     assert "no recipe makes 2 outputs of earlier runs" in run.err
     assert "no recipe matches a file" in run.err
     assert call("run", "--delete-stale").code == 5
-    assert outputs(made) == set()
+    assert built_files(made) == set()
     assert "note" not in call("run").err
 
 
 def test_a_mistyped_pattern_deletes_nothing(made: Path, call: Call) -> None:
     settings = made / "gltf-anim.toml"
     settings.write_text(settings.read_text().replace("*.glb", "*.gbl"))
-    before = outputs(made)
+    before = built_files(made)
     run = call("run", "--delete-stale")
     assert run.code == 5
     assert "not deleted, since their inputs are still there" in run.err
-    assert outputs(made) == before
+    assert built_files(made) == before
 
 
 def test_outputs_of_settings_that_were_renamed_are_stale(made: Path, call: Call) -> None:
@@ -93,7 +80,7 @@ def test_outputs_of_other_settings_in_the_folder_are_not_stale(is_saved: bool, m
         (made / ".gltf-anim-cache/outputs.json").unlink()
     assert "note" not in call("run", "--config", "small.toml", "--delete-stale").err
     assert "note" not in call("run", "--delete-stale").err
-    assert outputs(made) == {"build/crowd/hero.glb"}
+    assert built_files(made) == {"build/crowd/hero.glb"}
     assert (made / "small/crowd/hero.glb").exists()
     write_crowd(made, cube="morph_cube")
     call("run", "--config", "small.toml").product()
@@ -105,7 +92,7 @@ def test_only_unchanged_outputs_of_earlier_runs_are_deleted(made: Path, call: Ca
     (made / "build/crowd/cube.glb").write_bytes(b"other")
     (made / "build/notes.glb").write_bytes(b"mine")
     call("run", "--delete-stale")
-    assert outputs(made) == {"build/crowd/hero.glb", "build/crowd/cube.glb", "build/notes.glb"}
+    assert built_files(made) == {"build/crowd/hero.glb", "build/crowd/cube.glb", "build/notes.glb"}
 
 
 def test_outputs_that_were_edited_are_named_and_stay(made: Path, call: Call) -> None:
@@ -132,7 +119,7 @@ def test_buffers_and_empty_folders_are_deleted_too(made: Path, call: Call) -> No
     (made / "gltf-anim.toml").unlink()
     write_recipe(made, *PLAIN, out="build/{stem}/{stem}.gltf")
     assert "no recipe makes 2 outputs" in call("run", "--delete-stale").err
-    assert outputs(made) == {f"build/{name}/{name}.{end}" for name in ("hero", "cube") for end in ("gltf", "bin")}
+    assert built_files(made) == {f"build/{name}/{name}.{end}" for name in ("hero", "cube") for end in ("gltf", "bin")}
     (made / "crowd/cube.glb").unlink()
     call("run", "--delete-stale")
     assert [path.name for path in (made / "build").iterdir()] == ["hero"]
@@ -171,7 +158,7 @@ def test_outputs_that_a_step_or_budget_names_are_not_deleted(against: str, made:
     else:
         write_recipe(made, f"from-euler --onto {against}", match="*.bvh", out="clips/{stem}.glb")
     assert "(build/crowd/hero.glb): deleted" in call("run", "--delete-stale").err
-    assert outputs(made) == {"build/crowd/cub.glb", "build/crowd/cube.glb"}
+    assert built_files(made) == {"build/crowd/cub.glb", "build/crowd/cube.glb"}
 
 
 def test_shared_buffers_are_not_deleted(made: Path, call: Call) -> None:
@@ -188,7 +175,7 @@ def test_shared_buffers_are_not_deleted(made: Path, call: Call) -> None:
     (by_content,) = (made / "build").glob("hero-*.bin")
     shutil.rmtree(made / "crowd")
     assert "no recipe makes 2 outputs" in call("run", "--delete-stale").err
-    assert outputs(made) == {f"build/{name}" for name in ("keep.gltf", "cube.bin", "hero.bin", "taken")}
+    assert built_files(made) == {f"build/{name}" for name in ("keep.gltf", "cube.bin", "hero.bin", "taken")}
     assert not by_content.exists()
 
 
@@ -203,130 +190,7 @@ def test_buffers_of_inputs_are_not_deleted(made: Path, call: Call) -> None:
     write_recipe(made, *PLAIN, match="*.gltf", out="small/{path}")
     (made / "crowd/cube.glb").unlink()
     assert "(build/far/cube.gltf): deleted" in call("run", "--delete-stale").err
-    assert outputs(made) == {"build/far/cube.bin", "build/far/hero.gltf", "build/far/hero.bin"}
-
-
-@pytest.fixture
-def pictured(made: Path, call: Call) -> Path:
-    """A folder with a run of two .gltf files with images, one of them shared; the input of the first is deleted."""
-    for path in (made / "crowd").iterdir():
-        path.unlink()
-    (made / "crowd/skins").mkdir()
-    for name in ("shared", "own"):
-        (made / f"crowd/skins/{name}.png").write_bytes(b"\x89PNG" + name.encode())
-    for name, images in {"a": ("own", "shared"), "b": ("shared",)}.items():
-        call("convert", "-", made / f"crowd/{name}.gltf", stdin=built("arm")).product()
-        document = json.loads((made / f"crowd/{name}.gltf").read_text())
-        document["images"] = [{"uri": f"skins/{image}.png"} for image in images]
-        (made / f"crowd/{name}.gltf").write_text(json.dumps(document))
-    (made / "gltf-anim.toml").unlink()
-    write_recipe(made, *PLAIN, match="crowd/*.gltf", out="build/{stem}.gltf")
-    call("run", "--delete-stale").product()
-    (made / "crowd/a.gltf").unlink()
-    assert outputs(made) >= {"build/a.gltf", "build/skins/own.png", "build/skins/shared.png"}
-    return made
-
-
-KEPT = {"build/b.gltf", "build/b.bin"}
-SHARED, OWN = "build/skins/shared.png", "build/skins/own.png"
-
-
-def test_images_that_a_run_copied_are_deleted_with_their_outputs(pictured: Path, call: Call) -> None:
-    assert "(build/a.gltf): deleted, with 1 image\n" in call("run", "--delete-stale").err
-    assert outputs(pictured) == {*KEPT, SHARED}
-    (pictured / "crowd/b.gltf").unlink()
-    assert call("run", "--delete-stale").code == 5
-    assert not (pictured / "build").exists()
-
-
-def test_images_of_a_run_that_was_ended_are_deleted_too(pictured: Path, call: Call) -> None:
-    """The journal has them."""
-    shutil.rmtree(pictured / "build")
-    call("run", "--no-cache").product()
-    record = pictured / ".gltf-anim-cache/outputs.json"
-    write_crowd(pictured, a="arm")
-    (pictured / "crowd/a.glb").rename(pictured / "crowd/a")
-    (pictured / "crowd/b.gltf").unlink()
-    record.unlink()
-    call("run", "--delete-stale")
-    assert not (pictured / "build/b.gltf").exists()
-    assert not (pictured / SHARED).exists()
-
-
-def change_image(made: Path) -> None:
-    (made / OWN).write_bytes(b"\x89PNG, other")
-
-
-def replace_image_before(made: Path) -> None:
-    """The image was there, with the same content, before the run."""
-    record = made / ".gltf-anim-cache/outputs.json"
-    content = json.loads(record.read_text())
-    del content["copies"][str(made)][OWN]
-    record.write_text(json.dumps(content))
-    (made / ".gltf-anim-cache/journal.jsonl").unlink()
-
-
-def name_in_other(made: Path) -> None:
-    (made / "build/mine.gltf").write_text('{"asset": {"version": "2.0"}, "images": [{"uri": "skins/own.png"}]}')
-
-
-def name_below(made: Path) -> None:
-    """Another output names it from a folder beside it."""
-    text = (made / "build/b.gltf").read_text()
-    (made / "crowd/b.gltf").write_text(text.replace("skins/shared.png", "../build/skins/own.png"))
-    shutil.copy(made / "build/b.bin", made / "crowd/b.bin")
-
-
-def name_from_beside(made: Path) -> None:
-    """A glTF in another folder of the settings, which no run knows, names it."""
-    (made / "levels").mkdir()
-    text = '{"asset": {"version": "2.0"}, "images": [{"uri": "../build/skins/own.png"}]}'
-    (made / "levels/level.gltf").write_text(text)
-
-
-def link_to_it(made: Path) -> None:
-    (made / "build/link.png").symlink_to("skins/own.png")
-
-
-def name_as_input(made: Path) -> None:
-    """As a file that a recipe reads, from far above."""
-    (made / "far").mkdir()
-    shutil.move(made / "build", made / "far/build")
-    text = (made / "far/build/a.gltf").read_text()
-    (made / "top.gltf").write_text(text.replace("skins/", "far/build/skins/").replace("a.bin", "far/build/a.bin"))
-    record = made / ".gltf-anim-cache/outputs.json"
-    record.write_text(record.read_text().replace('"build/', '"far/build/'))
-    (made / "gltf-anim.toml").write_text((made / "gltf-anim.toml").read_text().replace('"build/', '"far/build/'))
-    write_recipe(made, *PLAIN, match="top.gltf", out="small/{path}")
-
-
-def break_other(made: Path) -> None:
-    """A glTF that can't be read may name it."""
-    (made / "build/broken.gltf").write_text("{")
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        change_image,
-        replace_image_before,
-        name_in_other,
-        name_below,
-        name_from_beside,
-        link_to_it,
-        name_as_input,
-        break_other,
-    ],
-)
-def test_images_that_others_may_need_are_not_deleted(
-    change: Callable[[Path], None], pictured: Path, call: Call
-) -> None:
-    change(pictured)
-    run = call("run", "--delete-stale")
-    assert "build/a.gltf): deleted" in run.err
-    place = pictured / ("far/build" if change is name_as_input else "build")
-    assert (place / "skins/own.png").exists()
-    assert not (place / "a.gltf").exists()
+    assert built_files(made) == {"build/far/cube.bin", "build/far/hero.gltf", "build/far/hero.bin"}
 
 
 def test_outputs_beside_their_inputs_are_no_inputs_when_these_are_deleted(folder: Path, call: Call) -> None:
@@ -340,7 +204,7 @@ def test_outputs_beside_their_inputs_are_no_inputs_when_these_are_deleted(folder
     (folder / "gltf-anim.toml").unlink()  # another recipe may have them as inputs
     write_recipe(folder, *PLAIN, match="crowd/*-small.glb")
     assert "note" not in call("run", "--delete-stale").err
-    assert outputs(folder) == {"build/crowd/hero-small.glb", "build/crowd/cube-small.glb"}
+    assert built_files(folder) == {"build/crowd/hero-small.glb", "build/crowd/cube-small.glb"}
 
 
 def test_results_that_were_not_used_for_longest_leave_the_cache(folder: Path, call: Call) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 from anim.check.checked_file import CheckedFile
 from anim.check.edits import replace_clips
 from anim.check.finding import Occurrence, Severity
+from anim.check.loop_gaps import describe_gap, gaps_by_clip
 from anim.check.rule import Fix, Parameters, Rule
-from anim.check.rules.loop_seam import describe_jump, gaps_by_clip
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.measure.inspect.root_motion import root_motion_node
@@ -51,7 +51,7 @@ def problem(found: Sequence[Occurrence]) -> str:
     """Return the fault, which is the same in all occurrences, and the largest gap."""
     if found[0].problem == EndFrameKind.DUPLICATE:
         return "two frames at the end have the first pose: a loop pauses for a frame"
-    return f"{LoopKind.OPEN_BY_ONE_FRAME}: {describe_jump(found)}"
+    return f"{LoopKind.OPEN_BY_ONE_FRAME}: {describe_gap(found)}"
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

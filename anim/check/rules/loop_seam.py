@@ -10,17 +10,14 @@ from anim.check.advice import MIN_REGULAR_FRACTION
 from anim.check.checked_file import CheckedFile
 from anim.check.edits import edit_clips
 from anim.check.finding import Occurrence, Severity
+from anim.check.loop_gaps import describe_gap, gaps_by_clip
 from anim.check.rule import Fix, Parameter, Parameters, Rule
 from anim.gltf.document import Document
 from anim.measure.inspect.frame_rate import GRID_TOLERANCE_FRAMES, estimate_frame_rate, usual_frame_rate
 from anim.measure.inspect.root_motion import root_motion_node
-from anim.measure.loops.clip_ends import LoopRange
-from anim.measure.loops.divided_ranges import measure_on_parts
-from anim.measure.loops.joint_gaps import JointGap, joint_gaps
 from anim.measure.loops.loop_kind import LoopKind
 from anim.measure.loops.recommendations import ADVICE, BLEND_S, blend_duration
 from anim.model import Clip
-from anim.units import format_number
 
 LOOP_NAME = r"(?i)(^|[^a-z])(loop|cycle|idle)([^a-z]|$)"
 MIN_FPS = 20.0  # of the keys added there
@@ -45,22 +42,9 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         yield file.in_clip(clip.index, value=sizes[clip.index], time_s=clip.end_s, node=node)
 
 
-def gaps_by_clip(file: CheckedFile, numbers: Sequence[int]) -> dict[int, list[JointGap]]:
-    """Return the joints of clips with a gap, by index of the clip. The translation of a root that travels is none."""
-    clips = [file.contents.clips[number] for number in numbers]
-    ranges = [LoopRange(each, each.start, each.end, root=root_motion_node(file.skeleton, each)) for each in clips]
-    return dict(zip(numbers, measure_on_parts(file.motion, ranges, joint_gaps), strict=True))
-
-
 def problem(found: Sequence[Occurrence]) -> str:
     """Return the largest gap."""
-    return describe_jump(found)
-
-
-def describe_jump(found: Sequence[Occurrence]) -> str:
-    """Return words for the largest gap; values are loop gaps as fractions of the model's size."""
-    largest = max(each.value for each in found)
-    return f"a loop jumps by {format_number(100 * largest, 2)} % of the model's size"
+    return describe_gap(found)
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:

@@ -120,7 +120,7 @@ def write_file(
     from anim.gltf.io import gltf_files
 
     folder = None if source is None or source.is_in_folder(path) or is_special(Path(path)) else source.folder
-    moved = document if folder is None else move_images(document, folder, path, within=within, dry_run=dry_run)
+    moved = document if folder is None else copy_external_images(document, folder, path, within=within, dry_run=dry_run)
     unchanged = unchanged if moved is document else None  # copies may have got other names
     document = moved
     guard.plan(Path(path), in_place=True)
@@ -138,7 +138,7 @@ def write_file(
     return size + (sum(map(_size_outside, document.buffers)) if same_folder else 0)
 
 
-def move_images(
+def copy_external_images(
     document: Document, folder: Path, path: str, *, within: Path | None = None, dry_run: bool = False
 ) -> Document:
     """Copy the images of a document in `folder` to the folder of an output; return the document with their names.

@@ -22,11 +22,9 @@ from anim.files import resolver
 from anim.gltf.document import Bytes, Document, Json
 from anim.gltf.io import container, json_text, uri
 from anim.gltf.io.content_names import DIGEST_LENGTHS
+from anim.gltf.io.file_references import NEAR_FOLDERS, begins_like_gltf, find_uris, is_called_gltf, read_json
 
 Note: TypeAlias = Callable[[str], object]
-NEAR_FOLDERS = 2  # a buffer's own and the one above: all files there are looked into, and unreadable ones need it
-_HEAD_BYTES = 64  # bytes to detect a glTF
-_BLANK = b"\xef\xbb\xbf \t\r\n"
 
 
 def external_buffers(path: Path) -> tuple[str, ...]:
@@ -120,18 +118,6 @@ def _needs(other: Path, buffer: Path, address: str, depth: int) -> bool:
         return is_called_so and depth < NEAR_FOLDERS
 
 
-def is_called_gltf(path: Path) -> bool:
-    """Return whether an extension of glTF is in a name."""
-    return any(suffix in path.name.lower() for suffix in container.SUFFIXES)
-
-
-def begins_like_gltf(path: Path) -> bool:
-    """Return whether the first bytes of a file are those of a GLB or of JSON. Raises OSError."""
-    with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
-    return head.startswith(container.MAGIC) or head.lstrip(_BLANK).startswith(b"{")
-
-
 def _may_name(json: bytes, name: str) -> bool:
     """Return False if the name is not in the JSON: a fast test for folders with many files."""
     is_plain = re.fullmatch(r"[\w.-]+", name, re.ASCII) is not None and b"%" not in json and b"\\u" not in json
@@ -140,9 +126,7 @@ def _may_name(json: bytes, name: str) -> bool:
 
 def _named(json: Json) -> set[str]:
     """Names of all files that JSON of glTF, which may be invalid, refers to."""
-    lists = [found for key in ("buffers", "images") if isinstance(found := json.get(key), list)]
-    addresses = [each.get("uri") for found in lists for each in found if isinstance(each, dict)]
-    return {_file_of(address) for address in addresses if isinstance(address, str)} - {""}
+    return {_file_of(address) for address in find_uris(json)} - {""}
 
 
 def _file_of(address: str | None) -> str:
@@ -155,11 +139,3 @@ def _file_of(address: str | None) -> str:
 def _opened(path: Path) -> Document:
     with path.open("rb") as file:
         return container.read(file.read())
-
-
-def read_json(path: Path) -> bytes:
-    """Return the bytes of a .gltf, or of a GLB up to the end of its JSON. Raises OSError."""
-    with path.open("rb") as file:
-        head = file.read(20)
-        is_glb = head.startswith(container.MAGIC)
-        return file.read(int.from_bytes(head[12:16], "little")) if is_glb else head + file.read()

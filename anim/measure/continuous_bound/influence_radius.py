@@ -80,18 +80,21 @@ def join_reaches(reaches: Sequence[InfluenceRadius]) -> InfluenceRadius:
 
 def _morphing(part: SkinnedGroups, old: Binding, new: Binding) -> Morphing:
     if part.surface.is_rigid:  # of thousands of nodes with one mesh, in one call for all targets
-        targets = np.array([_longest(part.surface.targets, old.bind[0, :, :3])]).T
+        targets = _longest_directions(part.surface.targets, old.bind[0, :, :3])[:, None]
     else:
         targets = np.array([_arms(part, target, old.bind, 0.0) for target in part.surface.targets])
     return Morphing((old.owner, new.owner), np.array([old.rest_weights, new.rest_weights]), targets.T)
 
 
-def _longest(targets: Floats, linear: Floats) -> Floats:
+def _longest_directions(targets: Floats, linear: Floats) -> Floats:
     """The longest direction (M,) of each target (M, V, 3), in the space to which a matrix (3, 3) leads."""
-    if (linear == np.eye(3)).all():
-        return np.asarray(np.sqrt((targets * targets).sum(axis=2)).max(axis=1, initial=0.0))
-    moved = np.einsum("ij,mvj->mvi", linear, targets)
-    return np.asarray(np.sqrt((moved * moved).sum(axis=2)).max(axis=1, initial=0.0))
+    is_same, size = bool((linear == np.eye(3)).all()), max(BLOCK // max(len(targets), 1), 1)
+    squares = np.zeros(len(targets))
+    for start in range(0, targets.shape[1], size):
+        some = targets[:, start : start + size]
+        moved = some if is_same else np.einsum("ij,mvj->mvi", linear, some)
+        np.maximum(squares, (moved * moved).sum(axis=2).max(axis=1), out=squares)
+    return np.asarray(np.sqrt(squares))
 
 
 def _arms(part: SkinnedGroups, points: Floats, bind: Floats, one: float) -> Floats:

@@ -17,8 +17,8 @@ class GroupedInfluences:
     """Vertices grouped by the joint with the largest weight.
 
     joints: (V, I) indices of joints below `num_joints`. weights: (V, I), those of 0 have no influence.
-    leaders: (G,) the joint of each group, ascending. groups: G arrays of vertices, ascending; those without influence
-    are in none. reach: of each group the joints with influence, ascending.
+    main_joints: (G,) the joint of each group, ascending. groups: G arrays of vertices, ascending; those without
+    influence are in none. reach: of each group the joints with influence, ascending.
     """
 
     def __init__(self, joints: Ints, weights: Floats, num_joints: int) -> None:
@@ -28,7 +28,7 @@ class GroupedInfluences:
         self._order = np.argsort(leader, kind="stable")
         self._order = self._order[np.asarray(self._carrying.any(axis=1))[self._order]]
         first = _first_of_each(leader[self._order])
-        self.leaders = leader[self._order[first]].tolist()
+        self.main_joints = leader[self._order[first]].tolist()
         self.groups = np.split(self._order, first[1:]) if len(first) else []
         self._group = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(self._order))))
         pairs = np.sort(self._pairs[self._carrying[self._order]])

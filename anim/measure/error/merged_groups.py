@@ -141,7 +141,7 @@ def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton
     """A surface on kept nodes, and its joints in the second version if they differ."""
     anchors, offsets = skeleton.anchors, skeleton.offsets
     if not len(surface.targets) and (binding is None or _has_joints(surface, binding)):
-        return _fold(surface, skeleton), None
+        return _merge_joints(surface, skeleton), None
     old = surface._replace(
         nodes=anchors[surface.nodes],
         bind=matrix.multiply(offsets[surface.nodes], surface.bind),
@@ -157,7 +157,7 @@ def _reduce(surface: Surface, binding: Binding | None, skeleton: ReducedSkeleton
     return old, None if _has_joints(old, new) and not len(surface.targets) else new
 
 
-def _fold(surface: Surface, skeleton: ReducedSkeleton) -> Surface:
+def _merge_joints(surface: Surface, skeleton: ReducedSkeleton) -> Surface:
     """A surface without morph targets on kept nodes: joints that follow the same one are one joint.
 
     Its points (V, I, 3) are those of each influence, in the space of the kept node.

@@ -109,7 +109,7 @@ class SkinnedGroups:
             boxes = _whole_box
         else:
             grouped = GroupedInfluences(influences, surface.weights, len(self.used))
-            self._leaders, self.groups, self.reach = grouped.leaders, grouped.groups, grouped.reach
+            self._leaders, self.groups, self.reach = grouped.main_joints, grouped.groups, grouped.reach
             products, boxes = grouped.products(rest), grouped.boxes
         self.bound_groups = BoundGroups(self.reach, products, boxes(rest), self.fraction)
         corners = boxes(surface.points) if len(surface.targets) else self.bound_groups.corners

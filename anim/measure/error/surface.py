@@ -24,7 +24,8 @@ class Surface(NamedTuple):
     """Vertices with one set of joints.
 
     name: of the mesh or node, for reports. nodes: (J,) the joints, or the one node of a rigid mesh.
-    bind: (J, 3, 4) joint_from_mesh at bind time. points: (V, 3) m, in mesh space. targets: (M, V, 3).
+    bind: (J, 3, 4) joint_from_mesh at bind time. points: (V, 3) m, in mesh space; those of merged joints, which are
+    measured only (`anim.measure.error.merged_groups`), are (V, I, 3), in the joints' spaces. targets: (M, V, 3).
     joints, weights: (V, I), into `nodes`. owner: the node with the morph weights, and their values at rest (M,).
     """
 

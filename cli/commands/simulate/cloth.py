@@ -188,10 +188,9 @@ def command(
             write_report(run.report, report)
         raise CheckError(excess, help=run.report.advice)
     cache = run.cache if up is None else up_axis.to_up_axis(run.cache, str(up))
-    units.warn_without_unit(max_error, "--max-error", reporter.warn)
-    meters = (
-        None if max_error is None else units.parse_length(max_error, "--max-error", lambda: statistics.diagonal(cache))
-    )
+    meters = None
+    if max_error is not None:
+        meters = units.parse_bound(max_error, "--max-error", lambda: statistics.diagonal(cache), reporter.warn)
     if keeps_materials(ending):
         cache, given["source"] = onto_source(
             _as_part(cache, scene, node), source, number, output=Output(output, ending, dry_run)

@@ -203,7 +203,6 @@ def command(
             end,
         )
         seconds = simulation.chosen_duration(duration, driver)
-        units.warn_without_unit(max_error, "--max-error", reporter.warn)
         chosen = replace(
             options,
             duration=seconds,
@@ -224,9 +223,7 @@ def command(
             ),
             attractors=tuple(parse_attractor(each, scene) for each in attractor or ()),
             max_nodes=None if force or ending in POINT_FORMATS else MAX_NODES,
-            max_error=0.0
-            if max_error is None
-            else units.parse_length(max_error, "--max-error", lambda: diagonal(scene)),
+            max_error=simulation.chosen_bound(max_error, scene, reporter.warn),
         )
         announce_compiling(reporter)
         try:

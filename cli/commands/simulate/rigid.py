@@ -10,7 +10,6 @@ import typer
 
 from anim.gltf.document import Document
 from anim.gltf.validation.extensions import PHYSICS
-from anim.measure.error.surface import diagonal
 from anim.model import Clip, Scene
 from anim.operations.selection import Selection
 from anim.simulation.registry import SIMULATIONS
@@ -24,7 +23,7 @@ from anim.simulation.rigid_bodies.simulate import (
     simulate_rigid_bodies,
 )
 from anim.units import plural
-from cli import text, units
+from cli import text
 from cli.errors import UsageError
 from cli.options import common, simulation
 from cli.options.simulation import name_option, parse_seconds, parse_vector
@@ -109,8 +108,7 @@ def command(
         description = replace(add_chosen(description, scene, chosen), floor=floor, floor_material=material)
         description = _with_velocities(description, scene, velocity or [])
         seconds = simulation.chosen_duration(duration, driver, simulation.RIGID_DURATION_S)
-        units.warn_without_unit(max_error, "--max-error", reporter.warn)
-        error = units.parse_length(max_error, "--max-error", lambda: diagonal(scene)) if max_error else 0.0
+        error = simulation.chosen_bound(max_error, scene, reporter.warn)
         run = simulate_rigid_bodies(scene, driver, description, replace(options, duration=seconds, max_error=error))
         for note in run.notes:
             reporter.warn(note)

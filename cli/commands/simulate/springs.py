@@ -165,8 +165,7 @@ def command(
             depth = deepest_penetration(scene.skeleton, result.clip, bones, _key_times(result))
         reduced = ""
         if prover is not None and max_error is not None:
-            units.warn_without_unit(max_error, "--max-error", reporter.warn)
-            bound = units.parse_length(max_error, "--max-error", lambda: prover.ruler.diagonal)
+            bound = units.parse_bound(max_error, "--max-error", lambda: prover.ruler.diagonal, reporter.warn)
             result, reduced = _reduce(result, prover, bound)
         found = make_report(scene.skeleton, bones, timed, result, error, depth)
         return _written(document, result.clip, number), found, _summary(found, result) + reduced

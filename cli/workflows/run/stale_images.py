@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from anim.errors import AnimError
 from anim.gltf.io.container import SUFFIXES
-from anim.gltf.io.file_references import find_near, find_referenced, place_of
+from anim.gltf.io.file_references import find_referenced, find_references_around, place_of
 from cli.workflows.run.outputs import OutputRecord
 
 
@@ -21,7 +22,8 @@ class StaleImages:
 
     def __init__(self, record: OutputRecord, outputs: Sequence[str]) -> None:
         self._folder = record.folder
-        named = _references(record.folder / name for name in outputs) or set() if record.copies else set()
+        files = [record.folder / name for name in outputs] if record.copies else []
+        named = _if_readable(partial(find_referenced, files)) or set()
         places = {name: place_of(record.folder / name) for name in record.copies}
         self._places = {name: place for name, place in places.items() if place in named}
         self._are_unchanged = record.is_unchanged_copy
@@ -38,8 +40,8 @@ class StaleImages:
             return []
         files = [self._folder / each for each in kept]
         documents = {*filter(_is_document, files), *filter(_is_document, self._folder.rglob("*"))}
-        used = _references(sorted(documents))
-        near = _near(self._places[name] for name in names)
+        used = _if_readable(partial(find_referenced, sorted(documents)))
+        near = _if_readable(partial(find_references_around, [self._places[name] for name in names]))
         if used is None or near is None:
             return []
         used |= near | {place_of(file) for file in files}
@@ -60,15 +62,9 @@ def _is_document(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES and path.is_file()
 
 
-def _references(files: Iterable[Path]) -> set[str] | None:
+def _if_readable(find: Callable[[], set[str]]) -> set[str] | None:
+    """The places that a search finds; None if a file can't be read, which may refer to any."""
     try:
-        return find_referenced(files)
-    except (AnimError, OSError, RecursionError):
-        return None
-
-
-def _near(places: Iterable[str]) -> set[str] | None:
-    try:
-        return find_near(places)
+        return find()
     except (AnimError, OSError, RecursionError):
         return None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from anim.errors import FormatError
-from anim.gltf.io.file_references import find_near, find_referenced, place_of
+from anim.gltf.io.file_references import find_referenced, find_references_around, place_of
 
 
 def write(path: Path, *addresses: str) -> Path:
@@ -35,11 +35,11 @@ def test_near_files_count_by_content_and_far_ones_by_name(tmp_path: Path) -> Non
     (tmp_path / "a/b/c/link").symlink_to("5.png")
     (tmp_path / "a/b/c/other.json").write_text("{1}")
     names = ("a/b/c/1.png", "a/b/2.png", "3.png", "a/b/c/5.png")
-    assert {place_of(tmp_path / name) for name in names} <= find_near([place])
-    assert place_of(tmp_path / "4.png") not in find_near([place])
+    assert {place_of(tmp_path / name) for name in names} <= find_references_around([place])
+    assert place_of(tmp_path / "4.png") not in find_references_around([place])
 
 
 def test_a_near_file_that_is_broken_is_an_error(tmp_path: Path) -> None:
     write(tmp_path / "a/b.gltf").write_text("{")
     with pytest.raises(FormatError):
-        find_near([place_of(tmp_path / "a/skin.png")])
+        find_references_around([place_of(tmp_path / "a/skin.png")])

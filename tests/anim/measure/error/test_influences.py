@@ -29,9 +29,9 @@ def test_groups_one_by_one(seed: int, of_each: bool) -> None:
     points = np.random.default_rng(seed).normal(size=(40, 3, 3) if of_each else (40, 3))
     found = GroupedInfluences(joints, weights, JOINTS)
     leader = np.where(weights.any(axis=1), joints[np.arange(40), weights.argmax(axis=1)], -1)
-    assert found.leaders == sorted(set(leader.tolist()) - {-1})
+    assert found.main_joints == sorted(set(leader.tolist()) - {-1})
     for joint, group, reach, products in zip(
-        found.leaders, found.groups, found.reach, found.products(points), strict=True
+        found.main_joints, found.groups, found.reach, found.products(points), strict=True
     ):
         assert group.tolist() == [v for v in range(40) if leader[v] == joint]
         assert reach.tolist() == sorted({int(joints[v, i]) for v in group for i in range(3) if weights[v, i] > 0})
@@ -60,7 +60,7 @@ def test_boxes_one_by_one(of_each: bool) -> None:
 def test_no_influence(shape: tuple[int, int]) -> None:
     found = GroupedInfluences(np.zeros(shape, np.int64), np.zeros(shape), 0)
     points = np.zeros((shape[0], 3))
-    assert (found.leaders, found.groups, found.reach, found.products(points)) == ([], [], [], [])
+    assert (found.main_joints, found.groups, found.reach, found.products(points)) == ([], [], [], [])
     assert found.boxes(points).shape == (0, 8, 3)
 
 

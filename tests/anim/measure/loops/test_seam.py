@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,64 +9,31 @@ import pytest
 from numpy.typing import ArrayLike
 
 import fixtures
-from anim.arrays import Floats
 from anim.gltf.reading import reader
 from anim.maths import matrix, quaternion
 from anim.measure.loops import skin_motion
 from anim.measure.loops.clip_ends import LoopRange
-from anim.measure.loops.loop_analysis import analyze_loop, analyze_loops
+from anim.measure.loops.loop_analysis import analyze_loop
 from anim.measure.loops.loop_kind import LoopKind
-from anim.measure.loops.seam import Seam, measure_seams
+from anim.measure.loops.seam import measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
-from anim.model import Clip, Interpolation, Mesh, MeshInstance, Scene
-from anim.sampling import clips as sampled_clips
+from anim.model import Interpolation, Scene
 from anim.sampling import sample_pose, world_matrices
 from anim.skinning.bake import bake
+from tests.anim.measure.loops.chains import AT, CHAIN, FPS, SWING, chain, swinging
 from tests.anim.skinning.scenes import looped, random_scene
-from tests.calls import count_calls
-from tests.clips import LINEAR, STEP, about, clip, skeleton, track
+from tests.clips import LINEAR, STEP, about, clip, track
 from tests.files import opened
-
-FPS = 10
-AT = np.arange(11) / FPS  # s
-SWING = 30 * np.sin(2 * np.pi * AT)  # deg; there and back, to the bit
-SWING[-1] = SWING[0]
-
-
-def _mesh(point: ArrayLike, target: ArrayLike | None = None) -> Mesh:
-    """One vertex, and one morph target that moves it."""
-    none = np.empty((1, 0))
-    targets = np.empty((0, 1, 3)) if target is None else np.array([[target]], float)
-    return Mesh("", np.array([point], float), np.empty((0, 3), int), none.astype(int), none, targets, np.empty(0))
-
-
-def _chain(targets: ArrayLike | None = None) -> Scene:
-    """Three joints in a row, 1 m apart, each with a vertex half a metre on; node 3 is a control without any."""
-    nodes = skeleton([-1, 0, 1, 0], translation=[[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 5, 0]])
-    rows = [MeshInstance(n, _mesh([0.5, 0, 0], targets), None, np.zeros(int(targets is not None))) for n in range(3)]
-    return Scene(nodes, tuple(rows))
-
-
-CHAIN = _chain()
-
-
-def _swinging(**ends: float) -> Clip:
-    """All joints swing; j0, j1, j2: by how much (deg) each drifts away until the end."""
-    tracks = []
-    for node in range(3):
-        degrees = (1 + 0.1 * node) * SWING + np.linspace(0, ends.get(f"j{node}", 0.0), 11)
-        tracks.append(track("rotation", AT, about("z", degrees), node=node))
-    return clip(*tracks)
 
 
 def test_a_swing_that_comes_back_is_closed() -> None:
-    found = analyze_loop(SkinMotion(CHAIN), _swinging())
+    found = analyze_loop(SkinMotion(CHAIN), swinging())
     assert (found.kind, found.seam, found.joints) == (LoopKind.CLOSED, 0.0, ())
 
 
 def test_a_joint_that_stays_open_is_named_with_its_own_gap() -> None:
     """Joint 1 is 5° off, with vertices at 0.5 m and 1.5 m from it: 2 r sin(θ/2), and nothing of the joints around."""
-    found = analyze_loop(SkinMotion(CHAIN), _swinging(j1=5))
+    found = analyze_loop(SkinMotion(CHAIN), swinging(j1=5))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [each.joint for each in found.joints] == ["1"]
     assert found.joints[0].gap == pytest.approx(3 * np.sin(np.radians(2.5)))
@@ -76,11 +42,11 @@ def test_a_joint_that_stays_open_is_named_with_its_own_gap() -> None:
 
 
 def test_gaps_that_reach_further_than_the_motion_are_no_loop() -> None:
-    assert analyze_loop(SkinMotion(CHAIN), _swinging(j1=150)).kind is LoopKind.NOT_A_LOOP
+    assert analyze_loop(SkinMotion(CHAIN), swinging(j1=150)).kind is LoopKind.NOT_A_LOOP
 
 
 def test_all_joints_one_frame_short_are_open_by_one_frame() -> None:
-    whole = _swinging()
+    whole = swinging()
     short = clip(*(each.with_keys(each.times[:-1], each.values[:-1]) for each in whole.tracks))
     found = analyze_loop(SkinMotion(CHAIN), short)
     assert found.kind is LoopKind.OPEN_BY_ONE_FRAME
@@ -89,33 +55,33 @@ def test_all_joints_one_frame_short_are_open_by_one_frame() -> None:
 
 def test_a_control_that_moves_no_vertex_does_not_count() -> None:
     control = track("translation", [0, 1], [[0, 5, 0], [7, 5, 0]], node=3)
-    found = analyze_loop(SkinMotion(CHAIN), clip(*_swinging().tracks, control))
+    found = analyze_loop(SkinMotion(CHAIN), clip(*swinging().tracks, control))
     assert (found.kind, found.seam) == (LoopKind.CLOSED, 0.0)
     without = Scene(CHAIN.skeleton, ())  # no vertices anywhere: then all nodes count
-    assert analyze_loop(SkinMotion(without), clip(*_swinging().tracks, control)).kind is LoopKind.NOT_A_LOOP
+    assert analyze_loop(SkinMotion(without), clip(*swinging().tracks, control)).kind is LoopKind.NOT_A_LOOP
 
 
 def test_a_turn_that_comes_back_with_the_other_sign_is_closed() -> None:
     around = track("rotation", AT, np.r_[about("z", 36.0 * np.arange(10)), -about("z", [0.0])], node=0)
-    found = analyze_loop(SkinMotion(CHAIN), clip(around, *_swinging().tracks[1:]))
+    found = analyze_loop(SkinMotion(CHAIN), clip(around, *swinging().tracks[1:]))
     assert (found.kind, found.joints) == (LoopKind.CLOSED, ())
 
 
 def test_a_seam_below_the_usual_motion_is_closed() -> None:
     """A tenth of the usual motion from frame to frame is not seen, but a thousandth of the size at most."""
-    found = analyze_loop(SkinMotion(CHAIN), _swinging(j2=0.01))
+    found = analyze_loop(SkinMotion(CHAIN), swinging(j2=0.01))
     assert 0 < found.seam < 0.1 * found.inside.typical
     assert found.kind is LoopKind.CLOSED
-    slow = clip(*(replace(each, values=about("z", 1e-3 * SWING) * [1, 1, 1, 1]) for each in _swinging().tracks[:2]))
+    slow = clip(*(replace(each, values=about("z", 1e-3 * SWING) * [1, 1, 1, 1]) for each in swinging().tracks[:2]))
     jump = track("rotation", AT, about("z", np.r_[1e-3 * SWING[:10], 0.01]), node=2)
     assert analyze_loop(SkinMotion(CHAIN), clip(*slow.tracks, jump)).kind is not LoopKind.CLOSED
 
 
 def test_morph_weights_that_stay_open_are_named() -> None:
     """A target of 0.2 m, at half weight in the end."""
-    scene = _chain([0, 0.2, 0])
+    scene = chain([0, 0.2, 0])
     smile = track("weights", AT, np.r_[np.zeros(10), 0.5][:, None], node=2)
-    found = analyze_loop(SkinMotion(scene), clip(*_swinging().tracks, smile))
+    found = analyze_loop(SkinMotion(scene), clip(*swinging().tracks, smile))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [(each.joint, each.is_morph) for each in found.joints] == [("2", True)]
     assert found.joints[0].gap == pytest.approx(0.1)
@@ -242,15 +208,15 @@ def test_two_keys_in_one_moment_are_a_step_too() -> None:
 def test_a_jump_at_the_end_counts() -> None:
     """STEP: the last key is shown for no time, but players that stop there show it."""
     stepped = track("translation", AT, np.r_[np.zeros((10, 3)), [[0, 0.05, 0]]], STEP, node=1)
-    found = analyze_loop(SkinMotion(CHAIN), clip(*_swinging().tracks, stepped))
+    found = analyze_loop(SkinMotion(CHAIN), clip(*swinging().tracks, stepped))
     assert found.kind is LoopKind.CLOSED_EXCEPT
     assert [each.gap for each in found.joints] == [pytest.approx(0.05)]
 
 
 @pytest.mark.parametrize("targets", [None, [0.0, 1, 0]])
 def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike | None) -> None:
-    drifting = _swinging(j1=3.0)
-    skin = SkinMotion(_chain(targets))
+    drifting = swinging(j1=3.0)
+    skin = SkinMotion(chain(targets))
     whole = LoopRange(drifting, drifting.start, drifting.end)
     (alone,) = measure_seams(skin, [whole])
     both = measure_seams(skin, [whole, whole._replace(frame=1 / FPS)])
@@ -258,44 +224,3 @@ def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike 
     assert (alone.gap, alone.speed, alone.fastest) == pytest.approx((both[1].gap, both[1].speed, both[1].fastest))
     assert (alone.frame, alone.going_on) == (0.0, alone.gap)
     assert both[1].frame > 0
-
-
-def test_many_nodes_or_frames_are_posed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Frames and clips one at a time give the same steps and seams, without the root's motion since the first frame."""
-    scene = _chain()
-    walk = clip(
-        track("translation", AT, np.stack((AT, 0 * AT, 0.1 * SWING), axis=1), node=0),
-        track("rotation", AT, about("z", SWING), node=1),
-    )
-    parts = [LoopRange(each, 0.0, 0.9, 0.1, root=0) for each in (walk, _swinging(j1=3))]
-    skin = SkinMotion(scene)
-    whole = _measured(skin, parts)
-    monkeypatch.setattr(skin_motion, "MAX_MATRICES", 1)
-    found = _measured(skin, parts)
-    assert (found[0] == whole[0]).all()
-    assert (found[1] == whole[1]).all()
-    assert found[2] == whole[2]
-
-
-def _measured(skin: SkinMotion, parts: Sequence[LoopRange]) -> tuple[Floats, Floats, list[Seam]]:
-    """Steps, changes of velocity and seams of ranges."""
-    steps = np.stack([np.stack((AT[:-1], AT[1:]))] * len(parts))
-    changes = skin.velocity_changes(parts, np.stack([AT[1:-1]] * len(parts)))
-    return skin.steps(parts, steps), changes, measure_seams(skin, parts)
-
-
-def test_clips_are_analyzed_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three milliseconds each added up: forty take as many calls as two, and each gets its own result."""
-    longer = clip(track("rotation", [0.0, 0.2, 0.5, 0.7], about("z", [0, 3, -2, 0.2]), node=1))
-    kinds = [_swinging(), _swinging(j1=5), longer, _swinging(j1=150), clip(track("scale", [0.0], [[1.0, 1, 1]]))]
-    skin = SkinMotion(CHAIN)
-    alone = [analyze_loop(skin, each) for each in kinds]
-    counted = count_calls(monkeypatch, sampled_clips, "_sample_parts")
-    found = analyze_loops(skin, kinds, [-1] * 5)
-    few = len(counted)
-    assert analyze_loops(skin, kinds * 8, [-1] * 40) == found * 8
-    assert len(counted) == 2 * few
-    assert [each.kind for each in found] == [each.kind for each in alone]
-    assert len({each.kind for each in found}) >= 3
-    for one, many in zip(alone, found, strict=True):
-        assert (many.seam, many.inside.largest, many.fps) == pytest.approx((one.seam, one.inside.largest, one.fps))
