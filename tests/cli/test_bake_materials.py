@@ -183,10 +183,10 @@ def test_at_most_256_targets(call: Call, textured_path: Path, tmp_path: Path) ->
     arrays["positions"] = random.normal(size=(300, 200, 3)).astype(np.float32)
     faces = np.zeros((0, 3), arrays["faces"].dtype)
     np.savez(cache, **{key: arrays[key] for key in ("times", "positions")}, faces=faces)
-    run = call("convert-cache", cache, tmp_path / "noise.glb", "--max-error", "1e-4")
+    run = call("convert-cache", cache, tmp_path / "noise.glb", "--max-error", "0.1mm")
     assert "256 morph targets can't keep every vertex within 0.0001 m" in refusal(run, 2)
     assert "WebGL2 promises 256" in help_line(run)
-    run = call("convert-cache", cache, tmp_path / "noise.glb", "--max-error", "1e-4", "--max-targets", "400")
+    run = call("convert-cache", cache, tmp_path / "noise.glb", "--max-error", "0.1mm", "--max-targets", "400")
     assert run.code == 0
     assert "299 morph targets" in run.err
 

@@ -274,7 +274,7 @@ def test_cloth_without_sense_is_refused_in_one_line(
 
 
 def test_the_advice_on_too_few_targets_names_an_option(call: Call, fixture: Fixture, tmp_path: Path) -> None:
-    line = ("--duration", "1", "--max-error", "1e-9", "--max-targets", "2")
+    line = ("--duration", "1", "--max-error", "1e-6mm", "--max-targets", "2")
     run = call("simulate", "cloth", fixture("flag"), tmp_path / "out.glb", "--mesh", "flag", *line)
     assert "2 morph targets can't keep every vertex within" in refusal(run, 2)
     assert "more --max-targets" in help_line(run)
