@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -38,6 +39,17 @@ def accumulate(
 def is_deep(levels: Sequence[Ints]) -> bool:
     """Return whether a tree is deep and thin, so that a step per level would take long for its number of nodes."""
     return len(levels) >= MIN_DEPTH and sum(map(len, levels)) <= MAX_WIDTH * len(levels)
+
+
+def filter_levels(levels: Sequence[Ints], chosen: Bools) -> tuple[Ints, ...]:
+    """Return of each level only the nodes in a mask (N,), as views of one array; a level may become empty."""
+    if not levels:
+        return ()
+    order = np.concatenate(levels)
+    kept = chosen[order]
+    ends = np.cumsum(kept)[np.cumsum(np.fromiter(map(len, levels), np.int64, len(levels))) - 1].tolist()
+    nodes = order[kept]
+    return tuple(nodes[start:end] for start, end in pairwise([0, *ends]))
 
 
 def find_subtrees(parents: Ints) -> tuple[Ints, Ints]:

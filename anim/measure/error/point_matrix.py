@@ -23,6 +23,7 @@ CARRIED = 0.1  # minimum weight with which a vertex represents a node
 DIRECTIONS = np.vstack((np.eye(3), -np.eye(3)))
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 ALL_DIRECTIONS = np.vstack((DIRECTIONS, CORNERS))
+MIN_FOLLOWERS = 1000  # nodes that follow one moving node, of which only the outermost are sampled
 DENSE = 4_000_000  # values; a larger matrix is stored as a sparse one
 
 
@@ -167,6 +168,21 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> PointMatrix:
         joints[some], factors[some] = own, each
         at += len(own)
     return PointMatrix(nodes, np.searchsorted(nodes, joints), factors)
+
+
+def outermost_nodes(anchors: Ints, nodes: Ints, places: Floats) -> Ints:
+    """Return those of S nodes that are the outermost of all that follow the same moving node.
+
+    anchors: (S,) that node. nodes: (S,) increasing. places: (N, 3) m, of all nodes in the rest pose. Where few follow
+    one, all of them; else the farthest in each of 14 directions: a displacement is largest at a corner of the hull.
+    """
+    chosen = [nodes[:0]]
+    order = np.argsort(anchors, kind="stable")
+    for some in np.split(nodes[order], np.flatnonzero(np.diff(anchors[order])) + 1):
+        if len(some) >= MIN_FOLLOWERS:
+            some = some[(places[some] @ ALL_DIRECTIONS.T).argmax(axis=0)]
+        chosen.append(some)
+    return unique_sorted(np.concatenate(chosen))
 
 
 def extreme_vertices(surface: Surface) -> set[int]:

@@ -14,6 +14,7 @@ from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.shell_points import nodes_without_vertices
 from anim.measure.error.surface import Surface, has_vertices, surfaces
 from anim.model import Clip, Scene, Skeleton, Track, parse_weight_pointer
+from anim.model.skeleton import nearest_at_or_above, node_mask
 from anim.optimization.options import Bounds, Effort, Policy
 from anim.optimization.search.answering_points import AnsweringPoints
 from anim.optimization.tracks import morph_weights
@@ -98,11 +99,13 @@ def build_context(
     skeleton = scene.skeleton
     found = surfaces(scene) if has_vertices(scene) else []
     unseen = nodes_without_vertices(skeleton, found)
-    shells = set(np.flatnonzero(unseen & _moving_nodes(skeleton, clips)).tolist())
+    animated = _animated_nodes(skeleton, clips)
+    shells = np.flatnonzero(unseen & hierarchy.with_descendants(skeleton.parents, animated))
     if policy.drop_invisible:
-        shells = {node for node in shells if node in policy.keep}
+        shells = np.array([node for node in shells.tolist() if node in policy.keep], np.int64)
     world = rest_world(skeleton)
-    points = points_.sample_points(scene, shells, bounds.shell, extra).by_joint()
+    shells = points_.outermost_nodes(nearest_at_or_above(skeleton.parents, animated)[shells], shells, world[:, :, 3])
+    points = points_.sample_points(scene, set(shells.tolist()), bounds.shell, extra).by_joint()
     places = points.places(world[:, None])[:, 0]
     return Context(
         skeleton,
@@ -119,11 +122,6 @@ def build_context(
     )
 
 
-def _moving_nodes(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:
-    """Mask (N,) of the nodes that any clip moves, by a track of their own or of an ancestor."""
-    moved = np.zeros(len(skeleton), np.bool_)
-    for clip in clips:
-        for track in clip.tracks:
-            if track.node is not None and track.path != "weights":
-                moved[track.node] = True
-    return hierarchy.with_descendants(skeleton.parents, moved)
+def _animated_nodes(skeleton: Skeleton, clips: tuple[Clip, ...]) -> Bools:
+    """Mask (N,) of the nodes whose transforms any clip animates."""
+    return node_mask(skeleton, (t.node for clip in clips for t in clip.tracks if t.path != "weights"))

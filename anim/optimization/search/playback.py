@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.maths import matrix, quaternion
+from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Skeleton
 from anim.sampling.track import MAX_MIXED_VALUES
 from anim.sampling.world import local_matrices
@@ -85,7 +85,7 @@ def required_levels(skeleton: Skeleton, nodes: Ints) -> tuple[Ints, ...]:
         while node >= 0 and not needed[node]:
             needed[node] = True
             node = int(skeleton.parents[node])
-    return tuple(level[needed[level]] for level in skeleton.levels())
+    return hierarchy.filter_levels(skeleton.levels(), needed)
 
 
 def level_world_matrices(skeleton: Skeleton, local: Sequence[Floats], levels: Sequence[Ints]) -> Floats:

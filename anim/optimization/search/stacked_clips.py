@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.maths import matrix
+from anim.maths import hierarchy, matrix
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.point_rows import stack_points
 from anim.model import Skeleton
+from anim.model.skeleton import nearest_at_or_above
 from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
 
@@ -141,16 +142,21 @@ def _rebind(
     """
     moves = np.ones(len(skeleton), np.bool_)
     moves[constant] = False
-    local = np.zeros((len(skeleton), 3, 4))
+    moves[skeleton.parents < 0] = True
+    local = np.tile(np.eye(4)[:3], (len(skeleton), 1, 1))
     local[constant] = np.swapaxes(matrices, 1, 2)
-    nearest, offsets = np.arange(len(skeleton)), np.tile(np.eye(4)[:3], (len(skeleton), 1, 1))
-    for level in required_levels(skeleton, points.nodes)[1:]:
-        some = level[~moves[level]]
-        above = skeleton.parents[some]
-        nearest[some] = nearest[above]
-        offsets[some] = matrix.multiply(offsets[above], local[some])
-    points = points.rebind(nearest, offsets)
+    offsets = _accumulate_below(skeleton, moves, local)
+    points = points.rebind(nearest_at_or_above(skeleton.parents, moves), offsets)
     return points, required_levels(skeleton, points.nodes)
+
+
+def _accumulate_below(skeleton: Skeleton, tops: Bools, local: Floats) -> Floats:
+    """Products (N, 3, 4) of local matrices on the path from the nearest of the nodes `tops` (N,), without its own."""
+    root = len(skeleton)  # one more node, above all `tops`
+    own = np.append(np.where(tops[:, None, None], np.eye(4)[:3], local), [np.eye(4)[:3]], axis=0)
+    parents = np.append(np.where(tops, root, skeleton.parents), root)
+    levels = (np.append(np.flatnonzero(tops), root), *hierarchy.filter_levels(skeleton.levels(), ~tops))
+    return hierarchy.accumulate(own, parents, levels, matrix.multiply)[:root]
 
 
 def _are_constant(sources: Sequence[SourceMotion], nodes: Ints) -> Bools:

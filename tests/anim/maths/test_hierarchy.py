@@ -110,3 +110,13 @@ def test_depths_and_who_is_below_whom_by_hand() -> None:
     subtrees = hierarchy.find_subtrees(parents)
     pairs = [(i, j) for i in range(5) for j in range(5) if hierarchy.is_below(subtrees, i, j)]
     assert pairs == [(1, 0), (2, 0), (2, 1), (3, 0)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_levels_of_some_nodes_are_those_picked_level_by_level(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    levels = levels_of([-1, *(int(random.integers(-1, i)) for i in range(1, 60))])
+    chosen = random.random(60) < seed / 3
+    found = hierarchy.filter_levels(levels, chosen)
+    assert [level.tolist() for level in found] == [level[chosen[level]].tolist() for level in levels]
+    assert hierarchy.filter_levels([], chosen) == ()

@@ -188,3 +188,16 @@ def test_small_surfaces_are_measured_together(monkeypatch: pytest.MonkeyPatch) -
         np.testing.assert_array_equal(found.nodes, alone.nodes)
         np.testing.assert_array_equal(found.joints, alone.joints)
         np.testing.assert_array_equal(found.factors, alone.factors)
+
+
+def test_of_many_nodes_that_follow_one_the_outermost_are_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+    places = np.random.default_rng(3).normal(size=(500, 3))
+    nodes, anchors = np.arange(20, 500), np.where(np.arange(20, 500) < 30, 4, 7)
+    assert points_.outermost_nodes(anchors, nodes, places).tolist() == nodes.tolist()
+    monkeypatch.setattr(points_, "MIN_FOLLOWERS", 100)
+    found = points_.outermost_nodes(anchors, nodes, places)
+    assert set(range(20, 30)) < set(found.tolist())  # few follow node 4
+    assert len(found) <= 10 + len(points_.ALL_DIRECTIONS)
+    for corner in (*np.eye(3), *-np.eye(3), np.ones(3), np.array([1.0, -1.0, 1.0])):
+        assert (places[found] @ corner).max() == (places[nodes] @ corner).max()
+    assert not len(points_.outermost_nodes(anchors[:0], nodes[:0], places))
