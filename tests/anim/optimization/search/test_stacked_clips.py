@@ -166,7 +166,7 @@ def test_a_long_chain_is_on_its_moving_node_as_each_node_after_its_parent_is() -
     local = matrix.from_trs(random.normal(size=(depth, 3)), _unit(random.normal(size=(depth, 4))), np.ones((depth, 3)))
     tops = np.zeros(depth, np.bool_)
     tops[[0, 5, 170]] = True
-    nodes = skeleton(*((i - 1, (0.0, 0.0, 0.0)) for i in range(depth)))
+    nodes = skeleton(range(-1, depth - 1))
     found = stacked_clips._accumulate_below(nodes, tops, local)
     expected = np.eye(4)[:3]
     for i in range(depth):
