@@ -16,8 +16,8 @@ class StepStreams:
     """Bytes and lines that one step reads and writes.
 
     name: of the input, for messages. input: stdin. folder: of relative paths. cores: number of processes that the step
-    may use, 0 for all. output, messages: bytes on stdout and lines on stderr. files: read by name, also by the step's
-    options, in order.
+    may use, 0 for all. output, messages: bytes on stdout and lines on stderr. error: the largest one that the step
+    measured, in words; "" of one that measures none. files: read by name, also by the step's options, in order.
     """
 
     def __init__(self, name: str, input: Bytes, folder: Path, cores: int = 0) -> None:
@@ -27,6 +27,7 @@ class StepStreams:
         self.cores = cores
         self.output: list[bytes] = []
         self.messages: list[str] = []
+        self.error = ""
         self.files: list[Path] = []
 
 
@@ -46,6 +47,12 @@ def use_streams(streams: StepStreams) -> Iterator[StepStreams]:
         yield streams
     finally:
         _streams.reset(token)
+
+
+def state_error(words: str) -> None:
+    """Keep the error that a step measured, for the report of all steps."""
+    if (step := _streams.get()) is not None:
+        step.error = words
 
 
 def locate(path: str) -> str:

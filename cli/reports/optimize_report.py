@@ -22,6 +22,8 @@ from cli.reports import optimize_bound
 from cli.reports.error_place import describe_place
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
 
+NOTHING_MOVED = "no vertex moved"
+
 
 @dataclass(frozen=True, slots=True)
 class OptimizeReport:
@@ -151,11 +153,19 @@ def _worst_words(about: OptimizeReport) -> str:
     return words + optimize_bound.summary(verdicts.values(), about.request, about.scale)
 
 
+def largest_error(about: OptimizeReport) -> str:
+    """Return the largest error of all clips without its place, "" without clips."""
+    error = max((each.error.max_error for each in about.found.verdicts.values()), default=None)
+    if error is None or about.unchanged:
+        return ""
+    return _length(error, about.scale) if error > FLOAT_NOISE * about.scale else NOTHING_MOVED
+
+
 def _error_words(verdict: Verification, about: OptimizeReport, clip: str = "") -> str:
     """Largest error of a clip, and its position. clip: " in 'Run'", where the line is about several."""
     error = verdict.error
     if error.max_error <= FLOAT_NOISE * about.scale:
-        words = "no vertex moved"
+        words = NOTHING_MOVED
     else:
         where = f"{clip} {describe_place(error)}, {error.time:.3f} s" if error.joint else clip
         words = _length(error.max_error, about.scale) + where

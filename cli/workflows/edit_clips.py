@@ -28,7 +28,7 @@ from anim.memory import MemoryBudget
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection
 from anim.units import format_number, plural
-from cli import text
+from cli import streams, text
 from cli.io import documents, scenes
 from cli.reports import image_notes
 from cli.reports.error_place import describe_place
@@ -158,6 +158,8 @@ def edit_together(
         return
     if words := growth_note(edited.before, edited.after, (source.size, size)):
         reporter.info(f"note: {words}")
+    if largest := max(filter(None, (edited.worst, edited.around)), key=_max_error, default=None):
+        streams.state_error(_length(largest, edited.diagonal))
     reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
@@ -251,12 +253,20 @@ def _summary(name: str, before: int, after: int, edited: EditResult, seconds: fl
 def _error(found: Proof, diagonal: float) -> str:
     """The largest error as text; "at least" if errors between the sampled times are not bounded."""
     error = found.error
-    least = "" if is_closed(found, diagonal) else "at least "
     where = f" {describe_place(error)}, {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = f"max {least}{text.format_length(error.max_error)}{text.format_fraction(error.max_error, diagonal)}{where}"
+    words = _length(found, diagonal) + where
     if error.max_pointer_error > 0:
         words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"
     return words
+
+
+def _length(found: Proof, diagonal: float) -> str:
+    least = "" if is_closed(found, diagonal) else "at least "
+    return f"max {least}{text.format_length(_max_error(found))}{text.format_fraction(_max_error(found), diagonal)}"
+
+
+def _max_error(found: Proof) -> float:
+    return found.error.max_error
 
 
 def _keys(clip: Clip) -> int:

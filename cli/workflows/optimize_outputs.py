@@ -14,6 +14,7 @@ from anim.measure.error.surface import is_measured_at
 from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.optimize import Optimized
 from anim.optimization.options import Request
+from cli import streams
 from cli.errors import UsageError
 from cli.io import documents
 from cli.reports import optimize_json, optimize_report
@@ -103,6 +104,7 @@ def write_report(
 
 
 def report_result(about: optimize_report.OptimizeReport, reporter: Reporter, *, dry_run: bool) -> None:
+    streams.state_error(optimize_report.largest_error(about))
     for line in () if reporter.quiet else optimize_report.lines(about, dry_run=dry_run):
         reporter.info(line)
     for words in optimize_report.warnings(about):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -240,4 +241,22 @@ def test_steps_show_no_progress_of_their_own(folder: Path, call: Call, monkeypat
     monkeypatch.setattr("cli.progress.DELAY_S", 0)
     monkeypatch.setattr("cli.progress.UPDATE_INTERVAL_S", 0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    assert "optimize" not in call("run").err
+    assert "optimize █" not in (err := call("run").err)
+    assert "\r1 of 1, crowd/arm 1.glb █" in err
+
+
+def test_a_file_is_listed_with_the_error_of_each_step(folder: Path, call: Call) -> None:
+    steps = "resample --fps 3", "convert", "optimize --max-error 5%"
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, *steps, match="crowd/hero.glb")
+    data, stated = (folder / "crowd/hero.glb").read_bytes(), []
+    for line in steps:
+        done = call(*line.split(), stdin=data)
+        data, found = done.product(), re.search(r"max [0-9.]+ \w+ \([0-9.]+ %\)", done.err)
+        stated += [f"{line.split()[0]} {found[0]}"] if found else []
+    assert len(stated) == 2
+    expected = ", ".join(stated)
+    assert f" %), {expected}, took " in call("run").err
+    (folder / "build/crowd/hero.glb").unlink()
+    assert f" %), {expected} (cached)" in call("run", "-v").err
+    assert f" %), {expected} (cached)" in call("run", "-v").err  # the output is there already

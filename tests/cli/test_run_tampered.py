@@ -198,7 +198,9 @@ def test_a_wrong_entry_of_a_journal_is_as_if_absent(values: dict[str, Any], made
     assert "1 file: 1 cached" in run.err
 
 
-@pytest.mark.parametrize("values", [{"size": 10**400}, {"size": -5}, {"is_plain": []}, {"files": {"x": 5}}])
+@pytest.mark.parametrize(
+    "values", [{"size": 10**400}, {"size": -5}, {"is_plain": []}, {"files": {"x": 5}}, {"step_errors": [5]}]
+)
 def test_a_wrong_record_of_a_result_is_as_if_absent(values: dict[str, Any], made: Path, call: Call) -> None:
     edit_record(made, **values)
     assert "1 file: 1 made" in call("run", "--verbose").err

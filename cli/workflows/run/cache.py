@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import re
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
@@ -35,13 +36,14 @@ class CacheRecord:
     """Result of the steps on one content.
 
     product: hash of the GLB. size: its bytes. files: hash by path of the other files that were read. is_plain: whether
-    the GLB has no external images, so that as an output it is one file of these bytes.
+    the GLB has no external images, so that as an output it is one file of these bytes. step_errors: as in `JobResult`.
     """
 
     product: str
     size: int
     files: dict[str, str]
     is_plain: bool
+    step_errors: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         """Raise TypeError for values of other types."""
@@ -50,6 +52,8 @@ class CacheRecord:
             raise TypeError("is no record of a result")
         if not isinstance(self.files, dict) or not all(isinstance(each, str) for each in self.files.values()):
             raise TypeError("has no hashes of files")
+        if not isinstance(self.step_errors, (list, tuple)) or not all(isinstance(e, str) for e in self.step_errors):
+            raise TypeError("has no errors of steps")
 
 
 @dataclass
@@ -102,9 +106,11 @@ class ResultCache:
             return None
         return data if hash_of(data) == record.product else None
 
-    def store(self, key: str, product: Bytes, files: dict[str, str], *, is_plain: bool) -> None:
+    def store(
+        self, key: str, product: Bytes, files: dict[str, str], *, is_plain: bool, step_errors: Sequence[str] = ()
+    ) -> None:
         """Keep a result. Raises OutputError."""
-        record = CacheRecord(hash_of(product), len(product), files, is_plain)
+        record = CacheRecord(hash_of(product), len(product), files, is_plain, tuple(step_errors))
         self._write(self._object(record.product), product)
         self._write(self._record(key), np.frombuffer(json.dumps(asdict(record)).encode(), np.uint8))
 

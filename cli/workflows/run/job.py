@@ -64,7 +64,8 @@ class JobResult:
     stamp: size and modification time of the input when the job began. seconds: of work. input_size: bytes of the input
     with its buffers, as `size` has those of the output. files: stamps by path of all other files read and written; None
     if one that was read was changed meanwhile, so that nobody knows which content the output is of. copies: images that
-    were copied beside the output, by their paths from the folder of the settings.
+    were copied beside the output, by their paths from the folder of the settings. step_errors: the largest error that
+    each step measured, with its name: "resample max 2.1 mm (0.1 %)".
     """
 
     code: int
@@ -75,6 +76,7 @@ class JobResult:
     input_size: int = 0
     files: Mapping[str, Stamp | None] | None = field(default_factory=dict)
     copies: tuple[str, ...] = ()
+    step_errors: tuple[str, ...] = ()
 
 
 class WrittenOutput(NamedTuple):
@@ -91,14 +93,15 @@ def run_job(job: Job) -> JobResult:
     stamp = stamp_of(job.folder / job.input)
     streams = StepStreams(job.input, EMPTY, job.folder)
     written = WrittenOutput()
+    step_errors: list[str] = []
 
     def work() -> int:
         nonlocal written
         _check_version(job.version)
-        code, files, product = run_steps(job, streams)
+        code, files, product = run_steps(job, streams, step_errors)
         if code == errors.DONE:
             if job.cache is not None:
-                store(job, product, files, began_ns)
+                store(job, product, files, began_ns, step_errors)
             written = write_output(job, product, files, began_ns)
         return code
 
@@ -106,7 +109,8 @@ def run_job(job: Job) -> JobResult:
         code = errors.run_guarded(work)
     seconds = time.perf_counter() - began
     size, others, copies = written
-    return JobResult(code, shorten(streams.messages), size, stamp, seconds, input_size(job), others, copies)
+    messages = shorten(streams.messages)
+    return JobResult(code, messages, size, stamp, seconds, input_size(job), others, copies, tuple(step_errors))
 
 
 def shorten(messages: Sequence[str]) -> tuple[str, ...]:
@@ -127,10 +131,10 @@ def _check_version(version: str) -> None:
         raise UnsupportedError(f"the worker has version {__version__} of gltf-anim (expected {version})")
 
 
-def run_steps(job: Job, messages: StepStreams) -> tuple[int, list[Path], Bytes]:
+def run_steps(job: Job, messages: StepStreams, step_errors: list[str]) -> tuple[int, list[Path], Bytes]:
     """Run the steps; return the exit code, the files that were read, and the GLB that the last step wrote.
 
-    messages: streams that get the messages of all steps.
+    messages: streams that get the messages of all steps. step_errors: gets their errors, as in `JobResult`.
     """
     files: list[Path] = []
     data = EMPTY
@@ -140,6 +144,7 @@ def run_steps(job: Job, messages: StepStreams) -> tuple[int, list[Path], Bytes]:
             code = main.run(step.words(argument_of(job.input) if number == 1 else PIPE))
         messages.messages += streams.messages
         files += streams.files
+        step_errors += [f"{step.label} {streams.error}"] if streams.error else []
         if code != errors.DONE:
             messages.messages.append(f"in step {number} of {len(job.steps)}: {shlex.join(step.words()[:1])}")
             return code, files, EMPTY
@@ -147,7 +152,7 @@ def run_steps(job: Job, messages: StepStreams) -> tuple[int, list[Path], Bytes]:
     return errors.DONE, files, data
 
 
-def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int) -> None:
+def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int, step_errors: Sequence[str]) -> None:
     """Keep the result in the cache, with the hashes of all files that were read besides the input.
 
     Not if the input was changed since its key was made, or another file since the steps began, a time in ns: the result
@@ -163,7 +168,7 @@ def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int) -> Non
     document = container.read(product)
     is_plain = not any(images.external_uri(image) for image in json_array(document.json, "images"))
     assert job.cache is not None
-    ResultCache(job.cache).store(key, product, others, is_plain=is_plain)
+    ResultCache(job.cache).store(key, product, others, is_plain=is_plain, step_errors=step_errors)
 
 
 def write_output(job: Job, product: Bytes, read: Iterable[str | Path], began_ns: int) -> WrittenOutput:

@@ -147,7 +147,8 @@ class RecipeRun:
             others = stamp_read(job.folder, [job.input, *record.files], began_ns)
             if others is not None:
                 others.pop(os.path.normpath(job.input))
-            return JobResult(errors.DONE, (), record.size, stamp, 0.0, input_size(job), others)
+            before, measured = input_size(job), tuple(record.step_errors)
+            return JobResult(errors.DONE, (), record.size, stamp, 0.0, before, others, step_errors=measured)
         product = cache.product(record)
         if product is None:
             return None
@@ -162,7 +163,8 @@ class RecipeRun:
             code = run_guarded(write)
         seconds = time.perf_counter() - began
         size, files, copies = written
-        return JobResult(code, tuple(streams.messages), size, stamp, seconds, input_size(job), files, copies)
+        messages, measured = tuple(streams.messages), tuple(record.step_errors)
+        return JobResult(code, messages, size, stamp, seconds, input_size(job), files, copies, measured)
 
     def _recipe(self, job: Job) -> str:
         if job.steps not in self._recipes:
@@ -207,7 +209,7 @@ class RecipeRun:
         if status == MADE or (self.reporter.verbose and status != FAILED):
             sizes = format_change(result.input_size, result.size)
             took = f", {format_duration(result.seconds)}" if status == MADE else f" ({status})"
-            reporter.info(f"{job.output}  {sizes}{took}")
+            reporter.info(f"{job.output}  {', '.join((sizes, *result.step_errors))}{took}")
 
 
 def is_notice(line: str) -> bool:
