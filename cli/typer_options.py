@@ -262,7 +262,10 @@ def _number(value: Any, kind: type, low: float | None, high: float | None) -> fl
     try:
         number: float = kind(value)
     except ValueError:
-        raise typer.BadParameter(f"'{value}' is no {'whole number' if kind is int else 'number'}") from None
+        named = "whole number" if kind is int else "number"
+        found = re.fullmatch(r"([\d.]+) ?(?:[a-z]+|%)", str(value).lower())
+        hint = f" (expected {found[1]}, without a unit)" if found else ""
+        raise typer.BadParameter(f"'{value}' is no {named}{hint}") from None
     if kind is int and abs(number) > MAX_INTEGER:
         raise typer.BadParameter(f"{value} is too large (expected at most {MAX_INTEGER:g})")
     if not math.isfinite(number):

@@ -149,7 +149,7 @@ def _factor(clip: Clip, speed: float | None, duration: float | None) -> float:
         if not 0 < speed <= MAX_SPEED:
             raise RangeError(
                 f"`speed` is {speed:g} (expected above 0, at most {MAX_SPEED:g})",
-                help="to play it backwards, reverse it",
+                help="to play it backwards, use `reverse`",
             )
         return 1 / speed
     if duration is None:

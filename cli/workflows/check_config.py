@@ -16,16 +16,20 @@ from anim.check.budget import MEASURES
 from anim.check.finding import Severity
 from anim.check.selection import RuleSelection
 from anim.errors import AnimError
+from cli import units
 from cli.errors import UsageError
 from cli.io import output_names
 from cli.workflows import config_tables
 
+_SIZES = ("bytes", "animation_bytes")  # also as text with a unit, as --max-bytes
 _KEYS: Mapping[str, config_tables.Keys] = {
     "": config_tables.SECTIONS,
     "check": {"select": list, "extend-select": list, "ignore": list, "target": str, "fail-on": str}
     | {"files": list, "params": dict},
     "check.files": {"match": str, "ignore": list},
-    "budget": {"match": str, "error": str, "against": str} | dict.fromkeys(MEASURES, (int, float)),
+    "budget": {"match": str, "error": str, "against": str}
+    | dict.fromkeys(MEASURES, (int, float))
+    | dict.fromkeys(_SIZES, (int, float, str)),
 }
 
 
@@ -167,8 +171,12 @@ def _budget(path: Path, entry: Any) -> Budget:
         output_names.check_placeholders(entry.get("against", ""), (*output_names.OF_PATHS, SUBFOLDER))
     except UsageError as error:
         raise UsageError(f"{path}: `against` of [[budget]] is {error}", help=_AGAINST_HELP) from None
-    limits = tuple((name, float(entry[name])) for name in MEASURES if name in entry)
+    limits = tuple((name, _limit(path, name, entry[name])) for name in MEASURES if name in entry)
     return Budget(entry["match"], limits, entry.get("error", ""), entry.get("against", ""))
+
+
+def _limit(path: Path, name: str, value: float | str) -> float:
+    return float(units.parse_size(value, f"{path}: budget.{name}") if isinstance(value, str) else value)
 
 
 def check_rules(config: CheckConfig) -> None:

@@ -278,7 +278,8 @@ def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
 
     before, after: clips of a file by index. Of a clip that starts after 0 s the time span is given: "0.5–1.5 s".
     """
-    spans = {i: [format_span(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
+    ends = {i: [(clip.start, clip.end) for clip in (before[i], after[i])] for i in before}
+    spans = {i: [format_span(*each) for each in pair] for i, pair in ends.items() if pair[0] != pair[1]}
     changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
     if len(changed) <= MAX_LISTED_CLIPS:
         return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())

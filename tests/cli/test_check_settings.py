@@ -177,7 +177,8 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     ("text", "words"),
     [
         ('match = "*"\nbyte = 3', "did you mean bytes?"),
-        ('match = "*"\nbytes = "3 MB"', "budget.bytes is '3 MB' (expected a number)"),
+        ('match = "*"\nbytes = "2 pounds"', "budget.bytes is '2 pounds' (expected a size like 800kB, 1.5MB or 65536)"),
+        ('match = "*"\nkeys = "2kB"', "budget.keys is '2kB' (expected a number)"),
         ('match = "*"\nbytes = nan', "budget.bytes is nan (expected a finite number)"),
         ("bytes = 3", "has no match"),
         ('match = "*"\nerror = "1mm"', "has no against"),
@@ -217,6 +218,13 @@ def test_a_baseline_is_the_same_from_every_folder(folder: Path, call: Call, monk
     monkeypatch.chdir(folder / "crowd")
     run = call("check", "..", "--baseline", "../known.json", "--format", "json", "--fail-on", "info")
     assert (run.code, run.json["findings"], run.json["gone"]) == (0, [], {})
+
+
+def test_sizes_of_budgets_take_units(folder: Path, call: Call) -> None:
+    size = (folder / "noop.glb").stat().st_size
+    for limit, code in ((f"{size / 1e3}kB", 0), (f"{size / 1e3 - 0.001:.3f} kB", 6)):
+        (folder / "gltf-anim.toml").write_text(f'[[budget]]\nmatch = "noop.glb"\nbytes = "{limit}"\n')
+        assert call("check", "noop.glb").code == code
 
 
 def test_no_budget_is_said(folder: Path, call: Call) -> None:

@@ -99,6 +99,8 @@ def test_where_and_help_are_shown_on_one_line_each(capsys: pytest.CaptureFixture
         (["resample"], "resample: missing option '--fps'", "gltf-anim resample --help"),
         (["resample", "--fps"], "resample: option '--fps' requires an argument", "gltf-anim resample --help"),
         (["resample", "--fps", "abc"], "invalid value for '--fps': 'abc' is no number", "gltf-anim resample --help"),
+        (["resample", "--fps", "24fps"], "'24fps' is no number (expected 24, without a unit)", "resample --help"),
+        (["trim", "--to", "0.5 s"], "'0.5 s' is no number (expected 0.5, without a unit)", "gltf-anim trim --help"),
         (["resample", "--fps", "inf"], "'inf' is no finite number", "gltf-anim resample --help"),
         (["convert", "--quiet=3"], "option '--quiet' does not take a value", "gltf-anim convert --help"),
         (["loop", "a", "b", "c"], "loop: got unexpected extra argument(s) (c)", "gltf-anim loop --help"),

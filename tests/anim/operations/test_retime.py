@@ -77,7 +77,7 @@ def test_reversed_lines_are_reversed_to_the_bit() -> None:
     ("options", "words"),
     [
         ({"speed": 0.0}, "`speed` is 0"),
-        ({"speed": -1.0}, "reverse it"),
+        ({"speed": -1.0}, "use `reverse`"),
         ({"duration": 0.0}, "`duration` is 0"),
         ({"offset": -1.0}, "leads to -1 s"),
         ({"speed": 1.0, "duration": 1.0}, "exclude"),
