@@ -100,7 +100,7 @@ class ImpactFinder:
         """Record the first contact of a moving body in the step before `index`, unless it touched before."""
         body = int(self._moving[k])
         first: float | None = None
-        for other, distance, normal, point in self._world.impulses(body):
+        for other, distance, normal, point in self._world.pushing_contacts(body):
             again = index - self._recent.get((body, other), -1_000_000) <= SAME_IMPACT_STEPS
             self._recent[body, other] = index
             delay = None if again else self._delay(body, other, distance, normal, point)

@@ -138,26 +138,34 @@ class RapierWorld:
         centers = [body.local_center_of_mass.to_tuple() for body in self._read]
         return np.array(centers).reshape(-1, 3) / self._units
 
-    def impulses(self, index: int) -> list[tuple[int, float, Floats, Floats]]:
+    def pushing_contacts(self, index: int) -> list[tuple[int, float, Floats, Floats]]:
         """Return the contacts that pushed a body in the last step, the strongest of each pair of colliders.
 
         Each: the other body, the distance of the shapes at the start of the step, the normal (3,) from the other, and
         the point (3,). Of shapes of several parts, whose contacts Rapier joins and gives no impulses, the nearest.
+        Rapier's impulses are those of its last substep. A body that bounced in an earlier one has none there: then
+        all contacts are returned that may have pushed it.
         """
-        found = []
-        for handle in self._bodies[index].colliders:
-            for pair in self._world.narrow_phase.contact_pairs_with(handle):
-                if not pair.total_impulse_magnitude():
-                    continue
-                is_second = self._colliders[pair.collider2.index][0] == index
-                other = self._colliders[(pair.collider1 if is_second else pair.collider2).index][0]
-                contacts = [(point, manifold) for manifold in pair.manifolds for point in manifold.points]
-                if contacts:
-                    point, manifold = max(contacts, key=lambda each: (each[0].impulse, -each[0].dist))
-                    normal = (1.0 if is_second else -1.0) * np.array(manifold.data.normal.to_tuple())
-                    at = self._contact_point(handle, manifold, is_second)
-                    found.append((other, float(point.dist) / self._units, normal, at / self._units))
-        return found
+        touching = [
+            (handle, pair)
+            for handle in self._bodies[index].colliders
+            for pair in self._world.narrow_phase.contact_pairs_with(handle)
+            if pair.has_any_active_contact
+        ]
+        pushing = [(handle, pair) for handle, pair in touching if pair.total_impulse_magnitude()]
+        found = (self._strongest_contact(index, handle, pair) for handle, pair in pushing or touching)
+        return [each for each in found if each is not None]
+
+    def _strongest_contact(self, index: int, handle: Any, pair: Any) -> tuple[int, float, Floats, Floats] | None:
+        is_second = self._colliders[pair.collider2.index][0] == index
+        other = self._colliders[(pair.collider1 if is_second else pair.collider2).index][0]
+        contacts = [(point, manifold) for manifold in pair.manifolds for point in manifold.points]
+        if not contacts:
+            return None
+        point, manifold = max(contacts, key=lambda each: (each[0].impulse, -each[0].dist))
+        normal = (1.0 if is_second else -1.0) * np.array(manifold.data.normal.to_tuple())
+        at = self._contact_point(handle, manifold, is_second)
+        return other, float(point.dist) / self._units, normal, at / self._units
 
     def _contact_point(self, handle: Any, manifold: Any, is_second: bool) -> Floats:
         """World position of a manifold's contacts, in the middle; handle: of the collider that is the second or not."""

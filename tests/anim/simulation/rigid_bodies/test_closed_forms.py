@@ -54,6 +54,18 @@ def test_two_balls_meet_when_their_distance_says() -> None:
         np.testing.assert_allclose(own[0].position, [x, 0, 0], atol=1e-4)
 
 
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("part", [0.05, 0.2, 0.5, 0.8])
+def test_an_impact_anywhere_in_a_step_is_found(part: float, e: float) -> None:
+    """Early in a step Rapier bounces in a substep before its last, of which it states the impulse: 0."""
+    material, hit = Material(0, 0, e), (100 + part) / 240
+    balls = [body(BALL, (-0.2 - 3 * hit, 0, 0), velocity=(3, 0, 0), material=material), body(BALL, material=material)]
+    motion = run(*balls, seconds=1.0, gravity=(0, 0, 0))
+    assert [[each.time for each in own] for own in motion.impacts] == [[pytest.approx(hit, abs=5e-6)]] * 2
+    after = (motion.positions[-1] - motion.positions[-25]) * 10  # momentum, and the speed of parting
+    np.testing.assert_allclose(after[:, 0], [1.5 * (1 - e), 1.5 * (1 + e)], atol=2e-3)
+
+
 def test_a_spinning_box_hits_with_its_lowest_corner() -> None:
     spin, corners = np.array([3.0, 4.0, 5.0]), np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     motion = run(ground(), body(Shape("box", (0.2, 0.2, 0.2)), (0, 1.5, 0), spin=spin), seconds=0.8)
