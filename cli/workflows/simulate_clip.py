@@ -61,6 +61,7 @@ def simulate_clip(
             if report is not None and error.report is not None and not dry_run:
                 write_report(error.report, report)
             raise
+        note_chosen_clip(source.document, clip, reporter)
         with commit_report_after(found, report, dry_run=dry_run):
             if isinstance(result, bytes):
                 size = len(result)
@@ -89,6 +90,14 @@ def driving_clip(document: Document, glob: str | None) -> int | None:
         more = " …" if len(chosen) > 4 else ""
         raise UsageError(f"--clip '{glob}' names {len(chosen)} clips ({listed}{more}): one drives a simulation")
     return chosen[0]
+
+
+def note_chosen_clip(document: Document, glob: str | None, reporter: Reporter) -> None:
+    """Note which clip drives the simulation, if no glob names one of several."""
+    names = reader.names(document)
+    if glob is None and len(names) > 1:
+        first = reader.clip_label(names[0], 0)
+        reporter.info(f"note: {first} drives the simulation, the first of {len(names)} clips (--clip: another)")
 
 
 def note_own_clip(name: str, driver: Clip, reporter: Reporter) -> None:

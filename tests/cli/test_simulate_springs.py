@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -208,3 +209,20 @@ def test_a_late_clip_swings_from_its_start(fixture: Fixture, call: Call, tmp_pat
         if a.path == "rotation":
             found = sample(b, a.times + 600)
             assert np.abs(np.sum(sample(a, a.times) * found, axis=1)).min() > np.cos(np.radians(1.0) / 2)
+
+
+def test_the_clip_that_drives_is_named_if_there_are_several(fixture: Fixture, call: Call, tmp_path: Path) -> None:
+    """Also of cloth; a file with one clip, and --clip, need no note."""
+    two, words = tmp_path / "two.glb", "drives the simulation, the first of 2 clips (--clip: another)"
+    asset = anim.load(fixture("ponytail"))
+    anim.save(asset.add_clips([replace(asset.clips["walk"], name="stand")]), two)
+    run = call(*COMMAND, two, tmp_path / "out.glb")
+    assert f"note: clip 'walk' {words}" in run.err
+    springs = anim.load(tmp_path / "out.glb")
+    assert len(springs.clips["walk"].tracks) == len(springs.clips["stand"].tracks) + 5
+    for path, args in ((two, ("--clip", "stand")), (fixture("ponytail"), ())):
+        assert "drives the simulation" not in call(*COMMAND, path, tmp_path / "out.glb", *args).err
+    flag = anim.load(fixture("flag"))
+    anim.save(flag.add_clips([replace(flag.clips[0], name="calm")]), two)
+    cloth = call("simulate", "cloth", two, tmp_path / "out.npz", "--mesh", "flag", "--duration", "0.1")
+    assert f"note: clip '{flag.clips[0].name}' {words}" in cloth.err

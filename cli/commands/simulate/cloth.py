@@ -37,7 +37,7 @@ from cli.reports import image_notes
 from cli.text import Reporter
 from cli.workflows.bake_clip import Output, keeps_materials, onto_source
 from cli.workflows.colliders import parse_colliders
-from cli.workflows.simulate_clip import NO_CLIP, driving_clip
+from cli.workflows.simulate_clip import NO_CLIP, driving_clip, note_chosen_clip
 from cli.workflows.simulation_report import check_report, commit_report_after, write_report
 
 Solver = StrEnum("Solver", [(name, name) for name in SOLVERS])  # type: ignore[misc]
@@ -182,6 +182,7 @@ def command(
             if report is not None and error.report is not None and not dry_run:
                 write_report(error.report, report)
             raise
+        note_chosen_clip(document, clip, reporter)
     excess = describe_elongation(run.report.worst_stretch, run.report.figures["substeps"], limit)
     if excess:
         if report is not None and not dry_run:
