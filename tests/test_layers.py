@@ -78,7 +78,8 @@ PUBLIC = {
     "curves.fitting": "adaptive_keys easing_fit key_reduction rotation_fit stacked_keys",
     "curves.tangents": "rule table",
     "exchange.euler": (
-        "baked_keys convention evaluate from_euler gimbal motion rotation_order to_bvh_motion to_euler unit_guess"
+        "baked_keys convention evaluate from_euler gimbal leading_pose motion rotation_order to_bvh_motion to_euler "
+        "unit_guess"
     ),
     "exchange.formats": "bvh_reader registry",
     "exchange.retarget": (

@@ -7,8 +7,11 @@ from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
 
+import numpy as np
+
 from anim.exchange.euler.from_euler import ImportedMotion
 from anim.exchange.euler.gimbal import NEAR_LOCK_RAD, GimbalStats
+from anim.exchange.euler.leading_pose import find_leading_pose
 from anim.exchange.euler.motion import EulerMotion
 from anim.exchange.retarget.apply import CharacterClip
 from anim.exchange.retarget.rest_alignment import Measure
@@ -48,6 +51,7 @@ def warnings(made: ConversionReport) -> Iterator[str]:
     yield from made.motion.notes
     if made.is_guess:
         yield f"scale: {made.scale_words}"
+    yield from _leading_pose(made.converted)
     if made.onto is not None and made.onto.num_bound:
         verb = "rests" if made.onto.num_bound == 1 else "rest"
         moved = f"{plural(made.onto.num_bound, 'joint')} of the character {verb} elsewhere than its skin was bound"
@@ -104,6 +108,16 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
             "joints_at_bind_pose": made.onto.num_bound,
         }
     return json_report.dump(content)
+
+
+def _leading_pose(converted: ImportedMotion) -> Iterator[str]:
+    """Words on a first frame apart from the motion, of a recording; adaptive keys aren't frames."""
+    found = None if converted.tolerance is not None else find_leading_pose(converted.clip)
+    if found is not None:
+        joints = plural(found.num_joints, "joint")
+        jump = f"{joints} jump to the next one, '{converted.skeleton.names[found.node]}' by {degrees(found.angle):.0f}°"
+        advice = f"`trim --from {np.float32(found.end)!s} --rebase` removes it from the clip"
+        yield f"the first frame is a pose apart from the motion: {jump} ({advice})"
 
 
 def listed(names: list[str]) -> str:

@@ -52,6 +52,24 @@ def test_it_says_what_it_guessed(call: Call) -> None:
     assert [line.split(":")[0] for line in quiet] == ["warning"] * 2
 
 
+def test_a_t_pose_at_the_first_frame_is_a_warning(call: Call) -> None:
+    """And `trim` with the time that it states leaves the motion alone."""
+    rows = "\n".join(f"0 90 0 {k} 0 0 {40 + k} 0 0" for k in range(20))
+    head = SMALL.partition(b"Frames")[0].decode()
+    text = f"{head}Frames: 21\nFrame Time: 0.0333333\n0 90 0 -60 0 0 0 0 0\n{rows}\n".encode()
+    run = call("from-euler", "-", "-", stdin=text)
+    made = run.product()
+    said = "2 joints jump to the next one, 'hip' by 60° (`trim --from 0.033333335 --rebase` removes it from the clip)"
+    assert f"warning: the first frame is a pose apart from the motion: {said}" in run.err
+    rest = call("trim", "-", "-", "--from", "0.033333335", "--rebase", stdin=made).product()
+    before, after = (reader.clips(opened(data))[0] for data in (made, rest))
+    for whole, track in zip(before.tracks, after.tracks, strict=True):
+        if len(whole.times) > 1:
+            np.testing.assert_array_equal(track.values, whole.values[1:])
+    plain = call("from-euler", "-", "-", stdin=text.replace(b"-60 0 0 0 0 0", b"-1 0 0 39 0 0"))
+    assert "apart from the motion" not in plain.err
+
+
 def test_a_late_clip_is_as_long_as_its_keys(call: Call) -> None:
     late = CURVES.replace(b"\n0,", b"\n5000,").replace(b"\n1,", b"\n5001,")
     run = call("from-euler", "-", "-", *XYZ, stdin=late)
