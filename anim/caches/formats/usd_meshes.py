@@ -118,7 +118,7 @@ class _Stage:
         return usd_motion.time_codes(self._meshes, self.rate)
 
     def faces(self) -> Ints:
-        """Triangles (T, 3) of all meshes."""
+        """Triangles (T, 3) of all meshes, counter-clockwise from outside in world space."""
         found = [np.empty((0, 3), np.int64)]
         for mesh, first, end in zip(self._meshes, self._ends, self._ends[1:], strict=False):
             counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], np.int64)
@@ -126,8 +126,15 @@ class _Stage:
             fits = counts.sum() == len(corners) and counts.min(initial=0) >= 0
             if not fits or (corners.size and not 0 <= corners.min() <= corners.max() < end - first):
                 raise FormatError(f"{mesh.GetPath()}: faces don't fit the points")
-            found.append(_fans(counts, corners) + first)
+            triangles = _fans(counts, corners) + first
+            found.append(triangles[:, [0, 2, 1]] if self._is_reversed(mesh) else triangles)
         return np.concatenate(found)
+
+    def _is_reversed(self, mesh: Any) -> bool:
+        """Whether faces are clockwise in world space: of a left-handed mesh, or of one that its transform mirrors."""
+        matrix = np.array(mesh.ComputeLocalToWorldTransform(self._earliest))[:3, :3]
+        is_left_handed = mesh.GetOrientationAttr().Get() == self._geom.Tokens.leftHanded
+        return bool(is_left_handed != (np.linalg.det(matrix) < 0))
 
     def positions(self, code: float | None) -> Floats | None:
         """Points of all meshes at a time code, None for the default ones if a mesh has none."""

@@ -96,3 +96,14 @@ def test_instances_are_read_with_their_own_transforms() -> None:
 def test_a_point_instancer_is_refused() -> None:
     with pytest.raises(UnsupportedError, match="/crowd is a PointInstancer"):
         stage('def PointInstancer "crowd" {\n rel prototypes = </crowd/mesh>\n CHILD\n}')
+
+
+@pytest.mark.parametrize("orientation", ["rightHanded", "leftHanded"])
+@pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (-1, -2, 1), (-1, -1, -1)])
+def test_faces_are_counter_clockwise_in_world_space(orientation: str, scale: tuple[float, ...]) -> None:
+    """By the normal that the file has of the triangle's outer side, moved with it."""
+    transform = f'double3 xformOp:scale = {scale}\n uniform token[] xformOpOrder = ["xformOp:scale"]'
+    cache = stage(f'def Xform "x" {{\n {transform}\n CHILD\n}}', primvars=f'token orientation = "{orientation}"')
+    first, second, third = positions_of(cache)[0][cache.faces[0]]
+    outside = np.array([0, 0, 1 if orientation == "rightHanded" else -1]) / scale  # transformed as normals are
+    assert np.dot(np.cross(second - first, third - first), outside) > 0
