@@ -8,7 +8,7 @@ from typing import Any
 from anim.caches.source_document.bake_source import BakeSource
 from anim.caches.source_document.single_clip_sources import SingleClipSources
 from anim.caches.source_document.still_source import without_animations
-from anim.gltf.document import Document
+from anim.gltf.document import Document, json_array
 from anim.gltf.io.source import Source
 from anim.gltf.writing import writer
 from anim.model import Clip, Scene
@@ -47,7 +47,8 @@ class BakeSources:
 
     def _made(self, document: Document, clip: int | None) -> Mapping[str, Any]:
         in_mesh_space = self._options.space == "mesh"
-        return {"source": BakeSource(document, clip, self._left_out, in_mesh_space, self._keep_skeleton)}
+        num_clips = len(json_array(self._source.document.json, "animations"))
+        return {"source": BakeSource(document, clip, self._left_out, in_mesh_space, self._keep_skeleton, num_clips)}
 
     def _document(self, output: Output) -> Document:
         """The prepared document; for a .gltf, whose images depend on its folder, of each file."""

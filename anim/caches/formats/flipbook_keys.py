@@ -21,6 +21,11 @@ def target(node: int, *, by_scale: bool) -> Json:
     """Return the target of the channel that switches a page."""
     if by_scale:
         return {"node": node, "path": "scale"}
+    return visibility_target(node)
+
+
+def visibility_target(node: int) -> Json:
+    """Return the target of a channel that hides and shows a node."""
     pointer = f"/nodes/{node}/extensions/{VISIBILITY}/visible"
     return {"path": "pointer", "extensions": {POINTER: {"pointer": pointer}}}
 

@@ -10,7 +10,7 @@ from anim.arrays import Floats
 from anim.caches.formats import flipbook_keys
 from anim.caches.formats.gltf_stream import GlbFile, primitive, signed, write_document
 from anim.caches.options import WriteOptions, WriteResult
-from anim.caches.source_document.expression_binds import lost_bind_notes
+from anim.caches.source_document.changed_references import reference_notes
 from anim.caches.source_document.flipbook_pages import replace_by_pages
 from anim.caches.storage import Outputs
 from anim.gltf.authoring_parts import VERTICES
@@ -41,7 +41,7 @@ def _write(cache: VertexCache, outputs: Outputs, writing: WriteOptions, *, by_sc
         return ()
     document = replace_by_pages(cache, writing.source, extras=extras, by_scale=by_scale)
     write_document(document, outputs)
-    return lost_bind_notes(writing.source.document.json, document.json)
+    return reference_notes(writing.source, document.json)
 
 
 def _write_alone(cache: VertexCache, outputs: Outputs, extras: Json, *, by_scale: bool) -> None:

@@ -16,7 +16,7 @@ from anim.arrays import AnyArray, Floats, Ints
 from anim.caches.formats.gltf_stream import GlbFile, primitive, signed, write_document
 from anim.caches.formats.morph_encoding import MAX_INT16, MorphEncoding, encode_morphs, fit_directions
 from anim.caches.options import MAX_TARGETS, WriteOptions, WriteResult
-from anim.caches.source_document.expression_binds import lost_bind_notes
+from anim.caches.source_document.changed_references import reference_notes
 from anim.caches.source_document.morph_targets import replace_by_morphs
 from anim.caches.storage import Outputs
 from anim.caches.transforms import statistics
@@ -69,7 +69,7 @@ def write(cache: VertexCache, outputs: Outputs, writing: WriteOptions) -> WriteR
             cache, form, normals, tangents, writing.source, extras=extras, quantize=writing.quantize
         )
         write_document(document, outputs)
-        lost = lost_bind_notes(writing.source.document.json, document.json)
+        lost = reference_notes(writing.source, document.json)
     return WriteResult(worst, (*_notes(form, cache.frame_count), *lost))
 
 

@@ -20,7 +20,7 @@ class BakeSource(NamedTuple):
 
     clip: index of the baked animation, whose channels of other nodes stay; None for none. left_out: nodes whose meshes
     are removed. in_mesh_space: whether the vertices are in the space of their mesh's node. keep_skeleton: keep skins
-    and the channels of joints.
+    and the channels of joints. num_clips: animations of the file, if the document has fewer.
     """
 
     document: Document
@@ -28,6 +28,7 @@ class BakeSource(NamedTuple):
     left_out: frozenset[int] = frozenset()
     in_mesh_space: bool = False
     keep_skeleton: bool = False
+    num_clips: int = 0
 
 
 class BakedMesh(NamedTuple):

@@ -12,6 +12,8 @@ from anim.caches.source_document import retained_channels
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span
 from anim.caches.source_document.excluded_meshes import drop_meshes
 from anim.caches.source_document.expression_binds import drop_binds
+from anim.caches.source_document.first_person import move_annotations
+from anim.caches.source_document.instanced_nodes import check_copies
 from anim.caches.source_document.placement import Placement, detach_meshes
 from anim.caches.source_document.primitives import BakedVertices, baked_primitives
 from anim.caches.source_document.winding import ReversedFaces, has_negative_determinant
@@ -118,9 +120,15 @@ class DocumentEdit:
                 self.json[key] = [*names, *missing]
 
     def document(self) -> Document:
-        """Return the edited document: one clip, no left-out meshes, no skins, binds and bytes that nothing uses."""
+        """Return the edited document: one clip, no left-out meshes, no skins, binds and bytes that nothing uses.
+
+        Raises UnsupportedError for copies of a mesh that would be lost or elsewhere.
+        """
+        check_copies(self.source, self.json, {each.node for each in self.meshes})
         clip = self._clip()
-        drop_binds(self.json, self.source.document.json, {each.node for each in self.meshes} | self.source.left_out)
+        detached = {each.node for each in self.meshes} | self.source.left_out
+        drop_binds(self.json, self.source.document.json, detached)
+        move_annotations(self.json, self.source.document.json, self._placement.new_nodes, detached)
         left_out = {self.source.document.json["nodes"][node]["mesh"] for node in self.source.left_out}
         drop_meshes(self.json, left_out, clip)
         if not self.source.keep_skeleton:
@@ -140,6 +148,7 @@ class DocumentEdit:
         kept = retained_channels.retained_channels(
             old, self.source.document.json, self.json, nodes, self.roots, keep_skeleton=self.source.keep_skeleton
         )
+        kept += self._placement.groups.channels(kept)
         used = sorted({channel["sampler"] for channel in kept})
         number = {index: len(self.samplers) + i for i, index in enumerate(used)}
         channels = self.channels + [{**channel, "sampler": number[channel["sampler"]]} for channel in kept]

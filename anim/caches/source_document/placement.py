@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, baked_name
+from anim.caches.source_document.visibility_groups import VisibilityGroups
 from anim.gltf.document import Json, json_array
 from anim.gltf.validation import hierarchy
 
@@ -25,7 +26,8 @@ class Placement:
     """Nodes and meshes of an edited document, in place, with what each baked mesh asks about all of them.
 
     parents: of each node, −1 for roots. roots: the nodes of each scene. joints: nodes that are joints of a skin.
-    num_users: number of nodes with each mesh.
+    num_users: number of nodes with each mesh. groups: those that hide meshes at the roots. new_nodes: by the node of a
+    baked mesh, those that have it now.
     """
 
     json: Json
@@ -34,6 +36,8 @@ class Placement:
     roots: list[set[int]]
     joints: frozenset[int]
     num_users: Counter[int]
+    groups: VisibilityGroups
+    new_nodes: dict[int, list[int]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, json: Json, source: BakeSource) -> Placement:
@@ -45,6 +49,7 @@ class Placement:
             [set(scene.get("nodes", ())) for scene in json_array(json, "scenes")],
             frozenset(joint for skin in json_array(source.document.json, "skins") for joint in skin["joints"]),
             Counter(node["mesh"] for node in json_array(json, "nodes") if "mesh" in node),
+            VisibilityGroups(json["nodes"], hierarchy.parents(source.document.json)),
         )
 
     def add_mesh(self, mesh: Json, old: int) -> int:
@@ -73,7 +78,7 @@ class Placement:
         own.update(node)
         if isinstance(extras, dict) and "extras" in node:
             own["extras"] = {**extras, **node["extras"]}
-        self._count(node)
+        self._count(baked, baked.node, node)
         return baked.node
 
     def place_new_node(self, baked: BakedMesh, node: Json) -> int:
@@ -83,24 +88,24 @@ class Placement:
         if self.source.in_mesh_space:
             self.json["nodes"][baked.node].setdefault("children", []).append(index)
         else:
-            self._add_root(index, self._scenes_of(baked.node))
-        self.parents.append(baked.node if self.source.in_mesh_space else -1)
-        self._count(node)
+            self._add_root(self.groups.place(index, baked.node), self._scenes_of(baked.node))
+        self._count(baked, index, node)
         return index
 
     def place_group(self, baked: BakedMesh, nodes: Sequence[Json], parent: Json) -> int:
         """Append nodes below a new `parent`, which is placed like a new node; return the index of the first one."""
         first, count = len(self.json["nodes"]), len(nodes)
         self.json["nodes"] += nodes
-        self.parents += [first + count] * count
-        for node in nodes:
-            self._count(node)
+        for i, node in enumerate(nodes):
+            self._count(baked, first + i, node)
         self.place_new_node(baked, {"children": list(range(first, first + count)), **parent})
         return first
 
-    def _count(self, node: Json) -> None:
+    def _count(self, baked: BakedMesh, index: int, node: Json) -> None:
+        """Count a node of a baked mesh, if it has a mesh."""
         if "mesh" in node:
             self.num_users[node["mesh"]] += 1
+            self.new_nodes.setdefault(baked.node, []).append(index)
 
     def _scenes_of(self, node: int) -> list[int]:
         """Indices of the scenes that hold a node."""
@@ -118,7 +123,7 @@ class Placement:
             if not parent["children"]:
                 del parent["children"]
             self.parents[node] = -1
-        self._add_root(node, scenes)
+        self._add_root(self.groups.place(node, above), scenes)
 
     def _add_root(self, node: int, scenes: Collection[int]) -> None:
         for i in scenes:

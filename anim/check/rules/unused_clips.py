@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule, counted
+from anim.errors import UnsupportedError
 from anim.gltf.document import Document, json_array
 
 
@@ -49,7 +50,10 @@ def _joints(file: CheckedFile, shown: set[int | None]) -> set[int | None]:
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
     """Return the document without these clips, and without their bytes."""
     from anim.gltf.writing.removal import remove_animations  # only fixes write
+    from anim.gltf.writing.unknown_extensions import extensions_naming_clips
 
+    if named := extensions_naming_clips(file.json):
+        raise UnsupportedError(f"{named[0]} may name clips by their index, which would change")
     return remove_animations(file.document, {each.number for each in found})
 
 

@@ -111,15 +111,27 @@ def possible_mesh_indices(value: Any) -> set[int]:
     return {number for _, item in _scalars(value) for number in _indices(item, "meshes")}
 
 
+def possible_node_indices(value: Any) -> set[int]:
+    """Return all that may be an index of a node inside an extension."""
+    return {number for _, item in _scalars(value) for number in _indices(item, "nodes")}
+
+
+def extensions_naming_clips(json: Json) -> list[str]:
+    """Return positions of unknown extensions that may name an animation by its index, as JSON pointers.
+
+    Those with the word in a name, a text or their own name, such as KHR_interactivity: any number may be one there.
+    """
+    return [place for place, part in unknown_extensions(json) if "animation" in f"{place} {part}".lower()]
+
+
 def possible_nodes(json: Json) -> set[int]:
     """Return all that may be an index of a node inside extensions.
 
     Known ones name a node by "node", as VRM's expressions and colliders do; in unknown ones any number may be one.
     """
-    unknown = (pair for _, part in unknown_extensions(json) for pair in _scalars(part))
+    unknown = (possible_node_indices(part) for _, part in unknown_extensions(json))
     every = (pair for _, part in unknown_extensions(json, frozenset()) for pair in _scalars(part))
-    named = (item for key, item in every if key == "node")
-    return {number for item in chain((item for _, item in unknown), named) for number in _indices(item, "nodes")}
+    return {number for key, item in every if key == "node" for number in _indices(item, "nodes")}.union(*unknown)
 
 
 def named_buffers(value: Any) -> set[int]:
