@@ -131,7 +131,7 @@ class _Stage:
         return np.concatenate(found)
 
     def _is_reversed(self, mesh: Any) -> bool:
-        """Whether faces are clockwise in world space: of a left-handed mesh, or of one that its transform mirrors."""
+        """True if faces are clockwise in world space: of a left-handed mesh, or of one that its transform mirrors."""
         matrix = np.array(mesh.ComputeLocalToWorldTransform(self._earliest))[:3, :3]
         is_left_handed = mesh.GetOrientationAttr().Get() == self._geom.Tokens.leftHanded
         return bool(is_left_handed != (np.linalg.det(matrix) < 0))
