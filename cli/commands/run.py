@@ -127,7 +127,7 @@ def command(
     except NotFoundError:  # as after all inputs were deleted
         _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
-            report_stale(record, book, (), {}, (), reporter, delete=delete_stale)
+            report_stale(record, book, (), outputs.WrittenFiles(), reporter, delete=delete_stale)
         raise
     if not inputs:
         _warn_of_unused(book, chosen, planned, record, reporter)
@@ -150,10 +150,10 @@ def command(
     if not no_cache and run.counts[journals.MADE]:
         _prune(results, limit, reporter)
     if is_all:
-        report_stale(record, book, run.jobs, run.written, run.copies, reporter, delete=delete_stale)
+        report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
     else:
-        record.save(run.written, run.copies)
-    written = [os.path.relpath(book.folder / each) for each in run.written]
+        record.save(run.written)
+    written = [os.path.relpath(book.folder / each) for each in run.written.inputs]
     return max(code, _check(written, quiet=quiet)) if check else code
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from anim.errors import NotFoundError
+from anim.errors import FormatError, NotFoundError
 from anim.gltf.io import container
 from cli.io import documents
 
@@ -26,7 +26,8 @@ class FoundFile(NamedTuple):
 def expand(inputs: Sequence[str]) -> list[str]:
     """Return the files of all inputs, each once: files as they are, of folders all glTF files below them.
 
-    A pattern is for shells that do not expand it, or for "**". Raises NotFoundError if one matches nothing.
+    A pattern is for shells that do not expand it, or for "**". Raises NotFoundError if one matches nothing, and
+    FormatError for a folder that can't be read.
     """
     return [found.path for found in find(inputs)]
 
@@ -69,9 +70,26 @@ def _matches(pattern: str) -> list[FoundFile]:
     return [FoundFile(each, folder or ".", is_searched=True) for each in found]
 
 
+def walk(folder: Path) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield folders with their folders and files as `os.walk` does; those behind links are none.
+
+    Raises FormatError for a folder that can't be read, whose files would be left out without a word. One that isn't
+    there has none.
+    """
+    return os.walk(folder, onerror=_refuse)
+
+
+def _refuse(error: OSError) -> None:
+    if not isinstance(error, FileNotFoundError | NotADirectoryError):
+        reason = (error.strerror or str(error)).lower()
+        raise FormatError(f"can't be read ({reason})", where=str(error.filename)) from None
+
+
 def _in_folder(folder: Path) -> Iterator[str]:
-    """Names of the glTF files below a folder, without hidden folders."""
-    for each in folder.rglob("*"):
-        hidden = any(part.startswith(".") for part in each.relative_to(folder).parts)
-        if not hidden and each.suffix.lower() in container.SUFFIXES and each.is_file():
-            yield str(each)
+    """Names of the glTF files below a folder, without hidden ones and hidden folders."""
+    for place, folders, names in walk(folder):
+        folders[:] = (each for each in folders if not each.startswith("."))
+        for name in names:
+            path = Path(place, name)
+            if not name.startswith(".") and path.suffix.lower() in container.SUFFIXES and path.is_file():
+                yield str(path)

@@ -12,7 +12,7 @@ from cli.workflows.run import own_files
 from cli.workflows.run import run as runs
 from cli.workflows.run.job import Job, JobResult, run_job
 from tests.cli.conftest import Call
-from tests.cli.running import refusal
+from tests.cli.running import built, refusal
 from tests.cli.running_recipes import statuses, write_crowd, write_recipe
 
 PLAIN = "resample --fps 12"
@@ -83,6 +83,41 @@ def test_two_runs_at_once_keep_the_outputs_and_lines_of_both(
     assert "2 files: 2 done before" in call("run", "--resume").err
     call("run", "--recipe", "arm").product()
     assert statuses(two_recipes) == {"crowd/arm 1.glb": "cached"}
+
+
+def test_what_is_edited_while_others_are_made_is_no_output(
+    two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its stamp at the end of the run was recorded as that of the output, which --delete-stale deleted."""
+    output, edited = two_recipes / "build/crowd/arm 1.glb", built("morph_cube")
+
+    def edit_the_first(job: Job) -> JobResult:
+        if job.input == "crowd/hero.glb":
+            output.write_bytes(edited)
+        return run_job(job)
+
+    monkeypatch.setattr(runs, "run_jobs", lambda jobs, *others: ((job, edit_the_first(job)) for job in jobs))
+    call("run").product()
+    (two_recipes / "crowd/arm 1.glb").unlink()
+    assert "that changed after its run (build/crowd/arm 1.glb): not deleted" in call("run", "--delete-stale").err
+    assert output.read_bytes() == edited
+
+
+def test_an_output_that_another_run_writes_again_is_its_output(
+    two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output, others = two_recipes / "build/crowd/arm 1.glb", ["arm"]
+
+    def write_the_first_again(job: Job) -> JobResult:
+        if job.input == "crowd/hero.glb" and others:
+            output.unlink()
+            call("run", "--recipe", others.pop()).product()
+        return run_job(job)
+
+    monkeypatch.setattr(runs, "run_jobs", lambda jobs, *others: ((job, write_the_first_again(job)) for job in jobs))
+    call("run").product()
+    (two_recipes / "crowd/arm 1.glb").unlink()
+    assert "(build/crowd/arm 1.glb): deleted" in call("run", "--delete-stale").err
 
 
 def test_outputs_are_recorded_before_stale_ones_are_deleted(

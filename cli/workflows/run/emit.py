@@ -16,13 +16,14 @@ from anim.gltf.io.images import external_uri
 from anim.gltf.io.source import buffer_files, open_file
 from cli.errors import DONE, PROGRAM, UsageError, run_guarded
 from cli.io import output_names
-from cli.workflows.run.job import Job, argument_of
+from cli.workflows.run.job import Job, argument_of, document_file
 from cli.workflows.run.places import output_key
-from cli.workflows.run.steps import EDITING, Step
+from cli.workflows.run.steps import Step
 
 HEADER = f"# made by `{PROGRAM} run --emit`"
 IN_BASH = '[ -n "${BASH_VERSION-}" ] || exec bash "$0"  # for bash: `sh` has no pipefail everywhere'
 EMBED = "--embed"
+ADVICE_TO_EMBED = f'take images in: steps = ["convert {EMBED}", …]'
 NOT_IN_MAKE = "\t\n\v\f\r%;=*?[]~\\|&"  # in a rule they mean something, and an escape does not hold everywhere
 NOT_IN_NINJA = "\n\r|"  # it has no escape for them
 Escape: TypeAlias = Callable[[str], str]  # of a text in a rule
@@ -76,13 +77,15 @@ def readable_jobs(jobs: Sequence[Job]) -> tuple[list[Job], int]:
 
 
 def _open_input(job: Job) -> None:
-    """Open the glTF input of a job. Raises AnimError with its name, and UsageError for a name of commands' own use."""
+    """Open the glTF that a job begins with. Raises AnimError with its name, and UsageError for a name of commands' own use."""
     output_names.check_placeholders(job.output)
-    if job.steps[0].command[0] in EDITING:
+    first = job.steps[0]
+    file = document_file(job)
+    if file is not None and (not first.onto or file.exists()):  # else an output that is made first
         try:
-            open_file(str(job.folder / job.input))
+            open_file(str(file))
         except AnimError as error:
-            raise error.at(job.input, ": ") from None
+            raise error.at(first.onto or job.input, ": ") from None
 
 
 def _pipeline(steps: Sequence[Step], input: str, output: str, escape: Escape = str) -> str:
@@ -112,22 +115,23 @@ def _other_inputs(job: Job, outputs: Mapping[str, str]) -> Iterator[str]:
     """Yield the other files that a job reads: of its steps' options, and buffers of the input."""
     for step in job.steps:
         yield from (outputs.get(output_key(name), name) for name in step.files)
-    if job.steps[0].command[0] in EDITING:
-        for path in buffer_files(open_file(str(job.folder / job.input))):
+    if (file := document_file(job)) is not None and file.exists():  # else an output that is made first
+        for path in buffer_files(open_file(str(file))):
             yield os.path.relpath(path, os.path.realpath(job.folder))
 
 
 def _check_images(job: Job) -> None:
     """Raise UsageError for an input with external images, which no pipe carries."""
-    first = job.steps[0]
-    if first.command[0] not in EDITING or EMBED in first.options or len(job.steps) == 1:
+    file, first = document_file(job), job.steps[0]
+    if file is None or not file.exists() or EMBED in first.options or len(job.steps) == 1:
         return
-    document = open_file(str(job.folder / job.input)).document
+    document = open_file(str(file)).document
     outside = [external_uri(image) for image in json_array(document.json, "images") if external_uri(image)]
     if outside:
         raise UsageError(
-            f"{job.input}: its image '{outside[0]}' is another file, which commands in a pipe do not copy",
-            help=f'`gltf-anim run` copies it; for a script, take images in: steps = ["convert {EMBED}", …]',
+            f"{first.onto or job.input}: its image '{outside[0]}' is another file, which commands in a pipe do not copy",
+            help="`gltf-anim run` copies it; for a script, "
+            + (f"name a file with its images in it: `convert {EMBED}`" if first.onto else ADVICE_TO_EMBED),
         )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from anim import __version__
 from anim.arrays import Bytes
 from anim.errors import AnimError, UnsupportedError, not_written
-from anim.files import atomic, guard
+from anim.files import atomic, guard, resolver
 from anim.gltf.document import Document, json_array
 from anim.gltf.io import container, images
 from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
@@ -31,7 +31,7 @@ from cli.text import Reporter
 from cli.workflows.run.cache import FileHashes, ResultCache, path_key
 from cli.workflows.run.places import check_output
 from cli.workflows.run.stamps import FileStatus, Stamp, stamp_files, stamp_of, stamp_read, status_of
-from cli.workflows.run.steps import Step
+from cli.workflows.run.steps import EDITING, Step
 
 EMPTY: Bytes = np.empty(0, np.uint8)
 MAX_FIRST_BYTES, MAX_LAST_BYTES = 20_000, 10_000  # of messages, together half of a pipe's buffer
@@ -192,7 +192,7 @@ def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> tuple[int, tuple
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise not_written(str(path.parent), error) from None
-    folder = (job.folder / job.input).parent
+    folder = image_folder(job)
     source = open_bytes(product, job.output)._replace(folder=folder)
     if is_text(job.output):
         source = source._replace(document=_as_the_last_step_writes(job, source.document))
@@ -222,16 +222,28 @@ def _as_the_last_step_writes(job: Job, document: Document) -> Document:
 def _stamp_companions(job: Job, product: Bytes, read: Sequence[Path], began_ns: int) -> dict[str, Stamp | None] | None:
     """Stamps of the files that the steps read, and of buffers and images of input and output.
 
-    product: GLB of the last step, whose images come from the input's folder. None if a file that was read, or the
-    input, was changed since a time in ns.
+    product: GLB of the last step. None if a file that was read, or the input, was changed since a time in ns.
     """
-    images = list(external_files(open_bytes(product, job.output)._replace(folder=(job.folder / job.input).parent)))
+    images = list(external_files(open_bytes(product, job.output)._replace(folder=image_folder(job))))
     written = external_files(open_file(str(job.folder / job.output))) if images or is_text(job.output) else ()
     others = stamp_read(job.folder, [job.input, *read, *images], began_ns)
     if others is None:
         return None
     stamps = {**others, **stamp_files(job.folder, written)}
     return {path: stamp for path, stamp in stamps.items() if path not in map(os.path.normpath, (job.input, job.output))}
+
+
+def document_file(job: Job) -> Path | None:
+    """Return the glTF that the steps begin with: the input, or the character that it moves; None without one."""
+    first = job.steps[0]
+    if first.onto:
+        return job.folder / first.onto
+    return job.folder / job.input if first.command[0] in EDITING else None
+
+
+def image_folder(job: Job) -> Path:
+    """Return the folder from which URIs of the result's images count: as single commands do, behind links."""
+    return resolver.resolve_links(document_file(job) or job.folder / job.input).parent
 
 
 def input_size(job: Job) -> int:

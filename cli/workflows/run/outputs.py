@@ -36,6 +36,26 @@ class RecordedOutput(NamedTuple):
     settings: str
 
 
+@dataclass
+class WrittenFiles:
+    """Files of a run, from the folder of the settings.
+
+    inputs: by output, of those that are complete. copies: images that were copied beside them. stamps: of all of these
+    when they were done. Who edits one while others are made has changed it: its stamp at the end is no output's.
+    """
+
+    inputs: dict[str, str] = field(default_factory=dict)
+    copies: set[str] = field(default_factory=set)
+    stamps: dict[str, Stamp] = field(default_factory=dict)
+
+    def add(self, folder: Path, output: str, input: str, copies: Collection[str]) -> None:
+        """Add an output as it is now, with its images."""
+        self.inputs[output] = input
+        self.copies |= set(copies)
+        stamps = {name: stamp_of(folder / name) for name in (output, *copies)}
+        self.stamps |= {name: stamp for name, stamp in stamps.items() if stamp is not None}
+
+
 @dataclass(frozen=True)
 class OutputRecord:
     """Outputs that runs of one folder have written. path: of the record, shared by several such folders.
@@ -73,16 +93,18 @@ class OutputRecord:
         name = output.settings
         return name == self.settings or bool(name and not (self.folder / name).exists())
 
-    def save(self, written: Mapping[str, str], copies: Iterable[str] = ()) -> None:
-        """Add outputs, each with its input, images and unsaved ones to the record as it is now.
+    def save(self, written: WrittenFiles) -> None:
+        """Add outputs, images and unsaved ones to the record as it is now.
 
         Another run may have added its own since this record was read. Raises OutputError.
         """
-        stamps = ((name, source, stamp_of(self.folder / name)) for name, source in written.items())
+        stamps = written.stamps
         new = {
-            name: RecordedOutput(source, stamp, self.settings) for name, source, stamp in stamps if stamp is not None
+            name: RecordedOutput(source, stamps[name], self.settings)
+            for name, source in written.inputs.items()
+            if name in stamps
         }
-        copied = {name: stamp for name in copies if (stamp := stamp_of(self.folder / name)) is not None}
+        copied = {name: stamps[name] for name in written.copies if name in stamps}
         self._update({**self.unsaved, **new}, {**self.unsaved_copies, **copied})
 
     def forget(self, names: Collection[str]) -> None:
@@ -95,17 +117,22 @@ class OutputRecord:
         with lock_folder(self.path.parent):
             content = _read(self.path)
             known, before = _outputs_of(content, self.folder), _copies_of(content, self.folder)
-            kept, left = _without({**known, **outputs}, forgotten), _without({**before, **copies}, forgotten)
+            new = {name: each for name, each in outputs.items() if not self._is_rewritten(name, known.get(name), each)}
+            kept, left = _without({**known, **new}, forgotten), _without({**before, **copies}, forgotten)
             if (kept, left) != (known, before):
                 folders = {**content.get(FOLDERS, {}), str(self.folder): kept}
                 others = {**content.get(COPIES, {}), str(self.folder): left}
                 text = json.dumps({"schema": SCHEMA, FOLDERS: folders, COPIES: others}) + "\n"
                 own_files.write(self.path.parent, self.path, np.frombuffer(text.encode(), np.uint8))
 
+    def _is_rewritten(self, name: str, known: RecordedOutput | None, new: RecordedOutput) -> bool:
+        """Return whether another run has written an output again, and its record is the one that fits the file."""
+        return known is not None and known.stamp != new.stamp and stamp_of(self.folder / name) == known.stamp
+
     def save_unsaved(self) -> None:
         """Add to the record what only the journal of the last run has. Raises OutputError."""
         if self.unsaved or self.unsaved_copies:
-            self.save({})
+            self.save(WrittenFiles())
 
 
 def read_outputs(path: Path, settings: Path, last: Entries) -> OutputRecord:

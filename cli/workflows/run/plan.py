@@ -29,7 +29,8 @@ def plan_jobs(
     earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
     named: whether the recipes are named by the command line: then files need not match.
     Outputs are never inputs: "*.glb" would match those beside their inputs. Raises UsageError for two files with one
-    output, and NotFoundError without any file.
+    output, NotFoundError without any file, and FormatError for a folder that can't be read: outputs of its files are no
+    stale ones.
     """
     given = [_relative(book, each) for each in input_files.expand(files)]
     jobs: dict[str, Job] = {}
@@ -99,7 +100,7 @@ def _files(book: RecipeBook, recipe: Recipe) -> Iterator[str]:
     """Files below the folder that can match, without hidden ones and those of the output's own folder."""
     outputs = _fixed_folder(recipe.out, "{")
     is_gltf = recipe.steps[0].command[0] in EDITING
-    for folder, folders, names in os.walk(book.folder / _fixed_folder(recipe.match, "*?[")):
+    for folder, folders, names in input_files.walk(book.folder / _fixed_folder(recipe.match, "*?[")):
         relative = Path(folder).relative_to(book.folder).as_posix()
         prefix = "" if relative == "." else f"{relative}/"
         folders[:] = sorted(each for each in folders if not each.startswith(".") and prefix + each != outputs)

@@ -30,6 +30,7 @@ from cli.workflows.run.job import (
 )
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
 from cli.workflows.run.order import group_jobs, keys_read
+from cli.workflows.run.outputs import WrittenFiles
 from cli.workflows.run.places import output_key
 from cli.workflows.run.stamps import stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import Step
@@ -41,8 +42,7 @@ class RecipeRun:
     """A run of jobs.
 
     cache: None to keep no results. processes: of this machine. cluster: its workers instead of these.
-    written: input by output, of those that are complete, from the folder of the settings. copies: images copied beside
-    them. code: the largest exit code.
+    written: outputs that are complete, and images beside them. code: the largest exit code.
     """
 
     jobs: Sequence[Job]
@@ -51,8 +51,7 @@ class RecipeRun:
     reporter: Reporter
     processes: int
     cluster: Cluster | None = None
-    written: dict[str, str] = field(default_factory=dict)
-    copies: set[str] = field(default_factory=set)
+    written: WrittenFiles = field(default_factory=WrittenFiles)
     counts: Counter[str] = field(default_factory=Counter)
     code: int = errors.DONE
     _hashes: FileHashes = field(default_factory=FileHashes)
@@ -176,8 +175,7 @@ class RecipeRun:
         if status == FAILED:
             self._failed[output_key(job.output)] = job.output, result.code
         else:
-            self.written[job.output] = job.input
-        self.copies |= set(result.copies)
+            self.written.add(job.folder, job.output, job.input, result.copies)
         self.code = max(self.code, result.code)
         self._progress.close()
         self._report(job, result, status)
@@ -192,7 +190,7 @@ class RecipeRun:
                 round(result.seconds, 3),
                 result.size,
                 result.stamp,
-                None if status == FAILED else stamp_of(job.folder / job.output),
+                None if status == FAILED else self.written.stamps.get(job.output),
                 None if result.files is None else dict(result.files),
                 result.messages if status == FAILED else tuple(filter(is_notice, result.messages)),
                 result.copies,

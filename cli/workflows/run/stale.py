@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from cli.errors import UsageError
 from cli.text import Reporter
 from cli.workflows import check_config
 from cli.workflows.run.job import Job, is_text
-from cli.workflows.run.outputs import OutputRecord
+from cli.workflows.run.outputs import OutputRecord, WrittenFiles
 from cli.workflows.run.recipe import RecipeBook
 from cli.workflows.run.stale_images import StaleImages
 
@@ -27,23 +27,22 @@ def report_stale(
     record: OutputRecord,
     book: RecipeBook,
     jobs: Sequence[Job],
-    written: Mapping[str, str],
-    copies: Collection[str],
+    written: WrittenFiles,
     reporter: Reporter,
     *,
     delete: bool,
 ) -> None:
     """Name the stale outputs, or delete them, after a run of all files and recipes; save the record.
 
-    written, copies: outputs with their inputs, and images beside them, of this run.
+    written: outputs of this run.
     Without any job none is deleted whose input is still there: a pattern is likely to be mistyped.
     Raises OutputError, and UsageError for settings of budgets that are wrong.
     """
     stale, changed = find_stale(record, book, jobs)
     is_doubtful = delete and not jobs and any((record.folder / record.outputs[name].input).exists() for name in stale)
     delete = delete and not is_doubtful
-    record.save(written, copies)
-    images = _delete(record, stale, written, list(_files_read(book, jobs))) if delete and stale else []
+    record.save(written)
+    images = _delete(record, stale, written.inputs, list(_files_read(book, jobs))) if delete and stale else []
     if stale:
         names = list_some(stale, MAX_LISTED_OUTPUTS)
         beside = f", with {plural(len(images), 'image')}" if images else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,7 @@ from pathlib import Path
 from anim.errors import AnimError
 from anim.gltf.io.container import SUFFIXES
 from anim.gltf.io.file_references import find_referenced, find_references_around, place_of
+from cli.io import input_files
 from cli.workflows.run.outputs import OutputRecord
 
 
@@ -39,13 +40,17 @@ class StaleImages:
         if not names:
             return []
         files = [self._folder / each for each in kept]
-        documents = {*filter(_is_document, files), *filter(_is_document, self._folder.rglob("*"))}
-        used = _if_readable(partial(find_referenced, sorted(documents)))
+        used = _if_readable(lambda: find_referenced(sorted({*filter(_is_document, files), *self._documents()})))
         near = _if_readable(partial(find_references_around, [self._places[name] for name in names]))
         if used is None or near is None:
             return []
         used |= near | {place_of(file) for file in files}
         return [name for name in names if self._places[name] not in used and self._unlink(name)]
+
+    def _documents(self) -> Iterator[Path]:
+        """Yield all glTF files below the folder of the settings. Raises FormatError for a folder that can't be read."""
+        for folder, _, names in input_files.walk(self._folder):
+            yield from filter(_is_document, (Path(folder, name) for name in names))
 
     def _is_plain(self, name: str) -> bool:
         """Return whether no link is on the way to an image."""

@@ -37,12 +37,14 @@ REFUSED = {  # options that no step can have, by parameter
 class Step:
     """A parsed step. command: its words, ("simulate", "springs") of a kind of simulation. options: all other words.
 
-    files: names of files in its options, which it reads.
+    files: names of files in its options, which it reads. onto: that of them which is the glTF that it changes, instead
+    of its input; "" without one.
     """
 
     command: tuple[str, ...]
     options: tuple[str, ...]
     files: tuple[str, ...] = ()
+    onto: str = ""
 
     def words(self, input: str = PIPE, output: str = PIPE) -> list[str]:
         """Return the command line on these files."""
@@ -78,7 +80,7 @@ def parse_step(line: str, *, is_first: bool) -> Step:
     found = _parsed(command, step, context)
     _check_values(command, step, found)
     files = (found[each.name] for each in command.params if each.param_type_name == "option" and each.metavar == "FILE")
-    return Step(step.command, step.options, tuple(filter(None, files)))
+    return Step(step.command, step.options, tuple(filter(None, files)), found.get("onto") or "")
 
 
 def _check_command(words: list[str], *, is_first: bool) -> None:
