@@ -69,7 +69,10 @@ def test_images_stay_if_a_folder_may_need_them(folder: Path, call: Call, refuse:
     assert "build/crowd/skin.png" in built_files(made)
 
 
-@pytest.mark.parametrize("command", [("check", "crowd"), ("inspect", "crowd"), ("convert", "crowd", "-o", "out/{path}")])
+FOLDERS = ("check", "crowd"), ("inspect", "crowd"), ("convert", "crowd", "-o", "out/{path}")
+
+
+@pytest.mark.parametrize("command", FOLDERS)
 def test_commands_on_folders_name_it(
     command: tuple[str, ...], folder: Path, call: Call, refuse: Callable[[Path], None]
 ) -> None:

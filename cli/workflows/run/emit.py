@@ -77,7 +77,7 @@ def readable_jobs(jobs: Sequence[Job]) -> tuple[list[Job], int]:
 
 
 def _open_input(job: Job) -> None:
-    """Open the glTF that a job begins with. Raises AnimError with its name, and UsageError for a name of commands' own use."""
+    """Open the glTF that a job begins with. Raises AnimError with its name, and UsageError for a reserved name."""
     output_names.check_placeholders(job.output)
     first = job.steps[0]
     file = document_file(job)
@@ -129,7 +129,7 @@ def _check_images(job: Job) -> None:
     outside = [external_uri(image) for image in json_array(document.json, "images") if external_uri(image)]
     if outside:
         raise UsageError(
-            f"{first.onto or job.input}: its image '{outside[0]}' is another file, which commands in a pipe do not copy",
+            f"{first.onto or job.input}: its image '{outside[0]}' is another file, which a pipe does not copy",
             help="`gltf-anim run` copies it; for a script, "
             + (f"name a file with its images in it: `convert {EMBED}`" if first.onto else ADVICE_TO_EMBED),
         )
