@@ -263,7 +263,8 @@ def _number(value: Any, kind: type, low: float | None, high: float | None) -> fl
         number: float = kind(value)
     except ValueError:
         named = "whole number" if kind is int else "number"
-        found = re.fullmatch(r"([\d.]+) ?(?:[a-z]+|%)", str(value).lower())
+        digits = r"\d+" if kind is int else r"\d*\.?\d+"
+        found = re.fullmatch(rf"({digits}) ?(?:[a-z]+|%)", str(value).lower())
         hint = f" (expected {found[1]}, without a unit)" if found else ""
         raise typer.BadParameter(f"'{value}' is no {named}{hint}") from None
     if kind is int and abs(number) > MAX_INTEGER:

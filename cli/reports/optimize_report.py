@@ -16,10 +16,10 @@ from anim.optimization.options import Drop, Request
 from anim.optimization.search.plan import Solution
 from anim.optimization.verification import FLOAT_NOISE, Verification
 from anim.optimization.writing import KEY
-from anim.units import FEW, format_number, list_some, plural
+from anim.units import FEW, list_some, plural
 from cli.errors import CheckError
 from cli.reports import optimize_bound
-from cli.reports.error_place import describe_place
+from cli.reports.error_place import describe_place, describe_pointers
 from cli.text import format_bytes, format_change, format_duration, format_fraction, format_length
 
 NOTHING_MOVED = "no vertex moved"
@@ -154,11 +154,13 @@ def _worst_words(about: OptimizeReport) -> str:
 
 
 def largest_error(about: OptimizeReport) -> str:
-    """Return the largest error of all clips without its place, "" without clips."""
-    error = max((each.error.max_error for each in about.found.verdicts.values()), default=None)
-    if error is None or about.unchanged:
+    """Return the largest error of all clips without its place, "" without changed clips."""
+    found = [each.error for each in about.found.verdicts.values()]
+    if not found or about.unchanged:
         return ""
-    return _length(error, about.scale) if error > FLOAT_NOISE * about.scale else NOTHING_MOVED
+    length = max(each.max_error for each in found)
+    words = _length(length, about.scale) if length > FLOAT_NOISE * about.scale else NOTHING_MOVED
+    return words + describe_pointers(max(found, key=lambda each: each.max_pointer_error))
 
 
 def _error_words(verdict: Verification, about: OptimizeReport, clip: str = "") -> str:
@@ -169,9 +171,7 @@ def _error_words(verdict: Verification, about: OptimizeReport, clip: str = "") -
     else:
         where = f"{clip} {describe_place(error)}, {error.time:.3f} s" if error.joint else clip
         words = _length(error.max_error, about.scale) + where
-    if error.max_pointer_error > 0:
-        words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"
-    return words
+    return words + describe_pointers(error)
 
 
 def _earlier(about: OptimizeReport) -> list[str]:

@@ -27,11 +27,11 @@ from anim.measure.inspect.track_statistics import non_unit_keys
 from anim.memory import MemoryBudget
 from anim.model import Clip, Scene, Skeleton
 from anim.operations.selection import Selection
-from anim.units import format_number, plural
+from anim.units import plural
 from cli import streams, text
 from cli.io import documents, scenes
 from cli.reports import image_notes
-from cli.reports.error_place import describe_place
+from cli.reports.error_place import describe_place, describe_pointers
 from cli.reports.rotation_notes import describe_non_unit_keys
 from cli.reports.size_notes import growth_note
 from cli.text import DRY, format_span, format_time
@@ -158,8 +158,9 @@ def edit_together(
         return
     if words := growth_note(edited.before, edited.after, (source.size, size)):
         reporter.info(f"note: {words}")
-    if largest := max(filter(None, (edited.worst, edited.around)), key=_max_error, default=None):
-        streams.state_error(_length(largest, edited.diagonal))
+    if edited.worst is not None:
+        largest = max(filter(None, (edited.worst, edited.around)), key=_max_error)
+        streams.state_error(_length(largest, edited.diagonal) + describe_pointers(edited.worst.error))
     reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
@@ -254,10 +255,7 @@ def _error(found: Proof, diagonal: float) -> str:
     """The largest error as text; "at least" if errors between the sampled times are not bounded."""
     error = found.error
     where = f" {describe_place(error)}, {error.time:.3f} s" if error.max_error and error.joint else ""
-    words = _length(found, diagonal) + where
-    if error.max_pointer_error > 0:
-        words += f", pointers max {format_number(100 * error.max_pointer_error, 2)} % of range at {error.pointer}"
-    return words
+    return _length(found, diagonal) + where + describe_pointers(error)
 
 
 def _length(found: Proof, diagonal: float) -> str:

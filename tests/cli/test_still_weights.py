@@ -16,6 +16,7 @@ from anim.gltf.writing import writer
 from anim.model import Clip, Track
 from anim.sampling.track import sample
 from tests.cli.conftest import Call
+from tests.cli.running_recipes import write_recipe
 from tests.files import glb_of, opened_fixture, opened_path
 
 TIMES = np.arange(21) / 30
@@ -82,3 +83,12 @@ def test_a_still_weight_away_from_rest_is_not_dropped(folder: Path, call: Call) 
     call("optimize", "constant.glb", "out.glb", "--max-error", "1%")
     (clip,) = reader.clips(opened_path(folder / "out.glb"))
     assert clip.tracks[0].values[0] == pytest.approx([0.5, 0.0], rel=1e-4)
+
+
+@pytest.mark.parametrize("step", ["resample --fps 4", "optimize --max-error 1mm --max-pointer-error 50%"])
+def test_a_run_states_it_too(step: str, folder: Path, call: Call) -> None:
+    command, *options = step.split()
+    line = call(command, "mixed.glb", "out.glb", *options).err
+    write_recipe(folder, step, match="mixed.glb")
+    words = line[line.index("pointers max ") : line.index("of 'turning'")]
+    assert words in next(each for each in call("run").err.splitlines() if each.startswith("build/"))
