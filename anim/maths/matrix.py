@@ -119,6 +119,21 @@ def accumulate_world(local: Floats, parents: Ints, levels: list[Ints], *, in_pla
     return np.swapaxes(world, 1, 3)
 
 
+def accumulate_from_tops(local: Floats, parents: Ints) -> tuple[Floats, Ints]:
+    """Return the products (N, 3, 4) of matrices on the path from each node's top, and that top (N,).
+
+    parents: (N,), −1 for tops, which need not be roots. Each step doubles the number of factors, so that a chain of N
+    nodes takes log2(N) steps; `accumulate_world` takes fewer operations in shallow trees.
+    """
+    tops = np.arange(len(parents))
+    local, parents = local.copy(), parents.copy()
+    while len(some := np.flatnonzero(parents >= 0)):
+        above = parents[some]
+        local[some] = multiply(local[above], local[some])
+        tops[some], parents[some] = tops[above], parents[above]
+    return local, tops
+
+
 def _multiply_columns(above: Floats, own: Floats) -> Floats:
     """Products of matrices given as (..., 4, 3, F)."""
     product: Floats = np.einsum("njif,nkjf->nkif", above[:, :3], own)

@@ -20,7 +20,6 @@ class _Changes(NamedTuple):
     """Nodes that a bake changes.
 
     emptied: without their mesh now. left: without it, or without a mesh that was below them.
-
     """
 
     emptied: Set[int]

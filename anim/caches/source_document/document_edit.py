@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats
+from anim.arrays import AnyArray, Bools, Floats
 from anim.caches.source_document import retained_channels
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, Span
 from anim.caches.source_document.excluded_meshes import drop_meshes
@@ -16,9 +16,8 @@ from anim.caches.source_document.first_person import move_annotations
 from anim.caches.source_document.instanced_nodes import check_copies
 from anim.caches.source_document.placement import Placement, detach_meshes
 from anim.caches.source_document.primitives import BakedVertices, baked_primitives
-from anim.caches.source_document.winding import ReversedFaces, has_negative_determinant
+from anim.caches.source_document.winding import ReversedFaces, find_negative_determinants
 from anim.gltf.document import Document, Json, copy_json, json_array
-from anim.gltf.validation import hierarchy
 from anim.gltf.writing.new_accessors import NewAccessors, edit_document
 
 CLIP_NAME = "cache"  # of a bake without a clip
@@ -41,12 +40,12 @@ class DocumentEdit:
     roots: set[int] = field(default_factory=set)
     replaced: set[int] = field(default_factory=set)
     _reversed: ReversedFaces = field(init=False)
-    _parents: list[int] = field(init=False)  # of the source's nodes
+    _is_mirrored: Bools = field(init=False)  # (N,) of the source's nodes
     _placement: Placement = field(init=False)
 
     def __post_init__(self) -> None:
         self._reversed = ReversedFaces(self.source.document)
-        self._parents = hierarchy.parents(self.source.document.json)
+        self._is_mirrored = find_negative_determinants(self.source.document.json)
         self._placement = Placement.of(self.json, self.source)
 
     @classmethod
@@ -68,9 +67,7 @@ class DocumentEdit:
     ) -> list[Json]:
         """Return the primitives of a baked mesh, in world space with reversed faces if its node mirrors them."""
         found = baked_primitives(self.new, self.source.document.json, baked, vertices, targets)
-        if self.source.in_mesh_space or not has_negative_determinant(
-            self.source.document.json, self._parents, baked.node
-        ):
+        if self.source.in_mesh_space or not self._is_mirrored[baked.node]:
             return found
         return [
             self._reversed.of(self.new, each, span[1] - span[0]) if span[0] < span[1] else each

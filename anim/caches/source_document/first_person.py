@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
@@ -23,9 +24,14 @@ def move_annotations(
     def of_node(node: int) -> list[int]:
         return list(new_nodes.get(node, ())) if node in detached else [node]
 
+    users: defaultdict[int, list[int]] = defaultdict(list)
+    for i, node in enumerate(json_array(source, "nodes")):
+        users[node.get("mesh", -1)].append(i)
+
     def of_mesh(mesh: int) -> list[int]:
-        users = [i for i, node in enumerate(json_array(source, "nodes")) if node.get("mesh") == mesh]
-        found = [json["nodes"][new]["mesh"] for user in users for new in of_node(user) if "mesh" in json["nodes"][new]]
+        found = [
+            json["nodes"][new]["mesh"] for user in users[mesh] for new in of_node(user) if "mesh" in json["nodes"][new]
+        ]
         return sorted(set(found)) or [mesh]
 
     extensions = json.get("extensions")

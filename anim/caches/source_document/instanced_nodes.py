@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
+import numpy as np
+
+from anim.arrays import Bools
 from anim.caches.source_document.bake_source import BakeSource
 from anim.errors import UnsupportedError
 from anim.gltf.document import Json, node_label
+from anim.gltf.reading.scene_nodes import INSTANCING
 from anim.gltf.validation import hierarchy
 from anim.gltf.validation.channel_targets import channel_target
-from anim.gltf.writing.reindex import INSTANCING
+from anim.maths.hierarchy import with_descendants
 
 TRANSFORMS = frozenset({"translation", "rotation", "scale", "matrix"})
 
@@ -23,11 +27,9 @@ def check_copies(source: BakeSource, json: Json, nodes: Collection[int]) -> None
     instanced = [each for each in sorted(nodes) if INSTANCING in json["nodes"][each].get("extensions", {})]
     if not instanced:
         return
-    moving = frozenset[int]() if source.in_mesh_space else _moving_nodes(source)
-    parents = hierarchy.parents(source.document.json)
+    is_moved = _moved_nodes(source)
     for node in instanced:
-        is_moved = not moving.isdisjoint(_with_ancestors(node, parents))
-        if is_moved or "mesh" not in json["nodes"][node] or _own_transform(source.document.json, json, node):
+        if is_moved[node] or "mesh" not in json["nodes"][node] or _own_transform(source.document.json, json, node):
             raise UnsupportedError(
                 f"{node_label(source.document.json, node)} has copies of its mesh by {INSTANCING}, which would be lost "
                 "or elsewhere",
@@ -42,18 +44,14 @@ def _own_transform(before: Json, after: Json, node: int) -> bool:
     return old != new
 
 
-def _moving_nodes(source: BakeSource) -> frozenset[int]:
-    """Nodes with a transform, at rest or in the baked clip."""
+def _moved_nodes(source: BakeSource) -> Bools:
+    """Mask (N,) of nodes that the bake takes from a transform, their own or one above, at rest or in the clip."""
     json = source.document.json
+    found = np.zeros(len(json["nodes"]), np.bool_)
+    if source.in_mesh_space:
+        return found
     clip = [] if source.clip is None else json["animations"][source.clip]["channels"]
     targets = [target for channel in clip if (target := channel_target(channel)) is not None]
-    moving = {node for node, path, _ in targets if node is not None and path in TRANSFORMS}
-    return frozenset(moving | {i for i, node in enumerate(json["nodes"]) if not TRANSFORMS.isdisjoint(node)})
-
-
-def _with_ancestors(node: int, parents: Sequence[int]) -> list[int]:
-    found = []
-    while node >= 0:
-        found.append(node)
-        node = parents[node]
-    return found
+    found[[node for node, path, _ in targets if node is not None and path in TRANSFORMS]] = True
+    found |= [not TRANSFORMS.isdisjoint(node) for node in json["nodes"]]
+    return with_descendants(np.array(hierarchy.parents(json), np.int64), found)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from anim.caches.source_document.bake_source import BakedMesh, BakeSource, baked_name
 from anim.caches.source_document.visibility_groups import VisibilityGroups
@@ -38,6 +40,16 @@ class Placement:
     num_users: Counter[int]
     groups: VisibilityGroups
     new_nodes: dict[int, list[int]] = field(default_factory=dict)
+    _scenes: dict[int, frozenset[int]] = field(default_factory=dict)  # that hold a node of the source, if it was asked
+    _scenes_by_root: dict[int, frozenset[int]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find the scenes of each root."""
+        found: defaultdict[int, set[int]] = defaultdict(set)
+        for i, roots in enumerate(self.roots):
+            for root in roots:
+                found[root].add(i)
+        self._scenes_by_root = {root: frozenset(scenes) for root, scenes in found.items()}
 
     @classmethod
     def of(cls, json: Json, source: BakeSource) -> Placement:
@@ -49,7 +61,7 @@ class Placement:
             [set(scene.get("nodes", ())) for scene in json_array(json, "scenes")],
             frozenset(joint for skin in json_array(source.document.json, "skins") for joint in skin["joints"]),
             Counter(node["mesh"] for node in json_array(json, "nodes") if "mesh" in node),
-            VisibilityGroups(json["nodes"], hierarchy.parents(source.document.json)),
+            VisibilityGroups(json["nodes"], np.array(hierarchy.parents(source.document.json), np.int64)),
         )
 
     def add_mesh(self, mesh: Json, old: int) -> int:
@@ -109,10 +121,15 @@ class Placement:
 
     def _scenes_of(self, node: int) -> list[int]:
         """Indices of the scenes that hold a node."""
-        chain = [node]
-        while self.parents[chain[-1]] >= 0:
-            chain.append(self.parents[chain[-1]])
-        return [i for i, roots in enumerate(self.roots) if not roots.isdisjoint(chain)]
+        path = []
+        while node >= 0 and node not in self._scenes:
+            path.append(node)
+            node = self.parents[node]
+        found = self._scenes.get(node, frozenset[int]())
+        for each in reversed(path):
+            found |= self._scenes_by_root.get(each, frozenset())
+            self._scenes[each] = found
+        return sorted(found)
 
     def _make_root(self, node: int) -> None:
         """Move a node from its parent to the roots of the scenes that hold it."""

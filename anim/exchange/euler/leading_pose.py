@@ -44,7 +44,7 @@ def find_leading_pose(clip: Clip) -> LeadingPose | None:
         is_linear = track.path == "rotation" and track.interpolation is Interpolation.LINEAR
         if track.node is None or not is_linear or len(track.times) < MIN_FRAMES:
             continue
-        angles = _steps(track.values)
+        angles = quaternion.angle_between(track.values[:-1], track.values[1:])
         if _is_jump(angles):
             jumps.append((float(angles[0]), track.node))
             end = float(track.times[1])
@@ -52,13 +52,6 @@ def find_leading_pose(clip: Clip) -> LeadingPose | None:
         return None
     angle, node = max(jumps)
     return LeadingPose(len(jumps), node, angle, end)
-
-
-def _steps(rotations: Floats) -> Floats:
-    """Angles (K − 1,) in rad between neighboring quaternions (K, 4)."""
-    units = quaternion.normalize(rotations)
-    cosine = np.abs(np.einsum("kc,kc->k", units[1:], units[:-1]))
-    return np.asarray(2 * np.arccos(np.minimum(cosine, 1.0)))
 
 
 def _is_jump(angles: Floats) -> bool:

@@ -92,7 +92,7 @@ def _reduce(one: Skeleton, other: Skeleton, moves: Bools, kept: Bools) -> Reduce
     local[moves] = IDENTITY
     rotation = np.where(moves[:, None], (0.0, 0.0, 0.0, 1.0), one.rotation)
     above = np.where(moves, -1, one.parents)
-    offsets, tops = _accumulate(local, above)
+    offsets, tops = matrix.accumulate_from_tops(local, above)
     turned = hierarchy.with_ancestors(above, kept & ~moves)
     rotations = _accumulate_rotations(rotation, np.where(turned, above, -1))
     nodes = np.flatnonzero(kept)
@@ -126,20 +126,6 @@ def _version(
         np.array(whole, np.int64),
         np.array([sheared[node] for node in nodes[whole].tolist()]).reshape(-1, 3, 4),
     )
-
-
-def _accumulate(local: Floats, parents: Ints) -> tuple[Floats, Ints]:
-    """The products of matrices from each node's root on, and that root.
-
-    Each step doubles the number of factors, so that a chain of N nodes takes log2(N) steps.
-    """
-    tops = np.arange(len(parents))
-    local, parents = local.copy(), parents.copy()
-    while len(some := np.flatnonzero(parents >= 0)):
-        above = parents[some]
-        local[some] = matrix.multiply(local[above], local[some])
-        tops[some], parents[some] = tops[above], parents[above]
-    return local, tops
 
 
 def _accumulate_rotations(rotations: Floats, parents: Ints) -> Floats:

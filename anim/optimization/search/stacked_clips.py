@@ -11,11 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from anim.arrays import Bools, Floats, Ints
-from anim.maths import hierarchy, matrix
+from anim.maths import matrix
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.point_rows import stack_points
 from anim.model import Skeleton
-from anim.model.skeleton import nearest_at_or_above
 from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
 
@@ -143,20 +142,12 @@ def _rebind(
     moves = np.ones(len(skeleton), np.bool_)
     moves[constant] = False
     moves[skeleton.parents < 0] = True
-    local = np.tile(np.eye(4)[:3], (len(skeleton), 1, 1))
+    local = np.zeros((len(skeleton), 3, 4))
     local[constant] = np.swapaxes(matrices, 1, 2)
-    offsets = _accumulate_below(skeleton, moves, local)
-    points = points.rebind(nearest_at_or_above(skeleton.parents, moves), offsets)
+    local[moves] = np.eye(4)[:3]
+    offsets, nearest = matrix.accumulate_from_tops(local, np.where(moves, -1, skeleton.parents))
+    points = points.rebind(nearest, offsets)
     return points, required_levels(skeleton, points.nodes)
-
-
-def _accumulate_below(skeleton: Skeleton, tops: Bools, local: Floats) -> Floats:
-    """Products (N, 3, 4) of local matrices on the path from the nearest of the nodes `tops` (N,), without its own."""
-    root = len(skeleton)  # one more node, above all `tops`
-    own = np.append(np.where(tops[:, None, None], np.eye(4)[:3], local), [np.eye(4)[:3]], axis=0)
-    parents = np.append(np.where(tops, root, skeleton.parents), root)
-    levels = (np.append(np.flatnonzero(tops), root), *hierarchy.filter_levels(skeleton.levels(), ~tops))
-    return hierarchy.accumulate(own, parents, levels, matrix.multiply)[:root]
 
 
 def _are_constant(sources: Sequence[SourceMotion], nodes: Ints) -> Bools:

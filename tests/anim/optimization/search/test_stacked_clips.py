@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anim.arrays import Floats
-from anim.maths import matrix, quaternion
+from anim.maths import quaternion
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.point_rows import stack_points
 from anim.model import Clip, Scene
@@ -159,20 +159,3 @@ def test_nodes_that_stay_are_found_in_blocks(block: int, monkeypatch: pytest.Mon
     for node in [*found.constant.tolist(), *found.varying.tolist()]:
         parts = [(part[node], first[i][node, 0]) for each in found.sources for i, part in enumerate(each.local)]
         assert (node in found.constant) == all((values == start).all() for values, start in parts)
-
-
-def test_a_long_chain_is_on_its_moving_node_as_each_node_after_its_parent_is() -> None:
-    random, depth = np.random.default_rng(1), 300
-    local = matrix.from_trs(random.normal(size=(depth, 3)), _unit(random.normal(size=(depth, 4))), np.ones((depth, 3)))
-    tops = np.zeros(depth, np.bool_)
-    tops[[0, 5, 170]] = True
-    nodes = skeleton(range(-1, depth - 1))
-    found = stacked_clips._accumulate_below(nodes, tops, local)
-    expected = np.eye(4)[:3]
-    for i in range(depth):
-        expected = np.eye(4)[:3] if tops[i] else matrix.multiply(expected, local[i])
-        np.testing.assert_allclose(found[i], expected, atol=1e-10)
-
-
-def _unit(rotations: Floats) -> Floats:
-    return np.asarray(rotations / np.linalg.norm(rotations, axis=1, keepdims=True))
