@@ -29,7 +29,7 @@ from anim.arrays import Floats, as_times
 from anim.asset import Asset, AssetLike, PathName, as_asset, copy_asset
 from anim.baked_cache import BakedCache, BakeOrigin
 from anim.errors import AnimError, RangeError
-from anim.gltf.document import Document
+from anim.gltf.document import Document, copy_json
 from anim.gltf.io import container
 from anim.gltf.reading import reader
 from anim.measure.compare import diff as compare
@@ -151,6 +151,8 @@ def optimize(
         ceiling = None if max_error is None else limits.max_error
         request, found = ByteLimit(optimizer, limit, request, ceiling).run()
     document, _ = optimizer.choose_document(found)
+    if document is not asset.document:
+        document = replace(document, json=copy_json(document.json))  # the caller may edit it
     return _build_result(asset, replace(asset, document=document), found, request.bounds, chosen)
 
 

@@ -119,19 +119,14 @@ def accumulate_world(local: Floats, parents: Ints, levels: list[Ints], *, in_pla
     return np.swapaxes(world, 1, 3)
 
 
-def accumulate_from_tops(local: Floats, parents: Ints) -> tuple[Floats, Ints]:
-    """Return the products (N, 3, 4) of matrices on the path from each node's top, and that top (N,).
+def accumulate_from_tops(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
+    """Return the products (N, 3, 4) of matrices on the path from each node's top to it.
 
-    parents: (N,), −1 for tops, which need not be roots. Each step doubles the number of factors, so that a chain of N
-    nodes takes log2(N) steps; `accumulate_world` takes fewer operations in shallow trees.
+    parents: (N,), −1 for tops, which need not be roots. levels: of the whole hierarchy, as of `accumulate_world`.
     """
-    tops = np.arange(len(parents))
-    local, parents = local.copy(), parents.copy()
-    while len(some := np.flatnonzero(parents >= 0)):
-        above = parents[some]
-        local[some] = multiply(local[above], local[some])
-        tops[some], parents[some] = tops[above], parents[above]
-    return local, tops
+    above = np.append(np.where(parents < 0, len(parents), parents), len(parents))  # of tops: an identity, the last row
+    rows = np.concatenate((local, np.eye(4)[None, :3]))[:, None]
+    return accumulate_world(rows, above, levels, in_place=True)[:-1, 0]
 
 
 def _multiply_columns(above: Floats, own: Floats) -> Floats:

@@ -20,6 +20,7 @@ from anim.optimization.search.context import Context, build_context
 from anim.optimization.search.lockstep import SearchRequest
 from anim.optimization.search.long_clips import search_all
 from anim.optimization.search.plan import FoundKeys, Solution
+from anim.optimization.search.reduced_context import reduce_context
 from anim.optimization.tracks.lossless_size import min_lossless_bytes
 from anim.optimization.tracks.quantization import BYTE_COSTS, Encoding
 from anim.optimization.tracks.redundant_keys import drop_redundant_keys
@@ -214,7 +215,8 @@ def _search(optimizer: ClipOptimizer, asked: Mapping[int, tuple[Effort, SearchRe
     for effort in dict.fromkeys(effort for effort, _ in asked.values()):
         some = {n: request for n, (one, request) in asked.items() if one == effort}
         extra = frozenset().union(*(request.extra for request in some.values()))
-        answers.update(zip(some, search_all(optimizer.context(extra), list(some.values()), effort), strict=True))
+        context, requests = reduce_context(optimizer.context(extra), list(some.values()))
+        answers.update(zip(some, search_all(context, requests, effort), strict=True))
     return answers
 
 

@@ -22,7 +22,7 @@ KEY = "gltf-anim"
 def write_solutions(document: Document, solutions: Mapping[int, Solution], packing: Packing) -> Document:
     """Return the document with the clips indexed in `solutions` in place of its own; no unused accessors."""
     clips = {i: _clip(each) for i, each in sorted(solutions.items())}
-    return reindex.drop_placeholders(writer.replace_clips(document, clips, extension=packing.extension))
+    return reindex.drop_placeholders(writer.replace_sharing(document, clips, extension=packing.extension))
 
 
 def _clip(solution: Solution) -> Clip:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import Bools, Floats, Ints, group_indices
 from anim.model import Interpolation, TimeAxis, Track, ValueKind
 from anim.sampling.track import KeyInterval, find_interval, interpolate
 
@@ -196,24 +196,26 @@ def concatenate(tracks: Sequence[Track]) -> list[ConcatenatedTracks]:
 
 def iterate_concatenated(tracks: Sequence[Track]) -> Iterator[ConcatenatedTracks]:
     """Yield the groups of `concatenate`, so that keys of one need to be in memory twice at a time."""
-    groups: dict[Rule, list[list[int]]] = {}
-    room: dict[Rule, int] = {}
-    for i, track in enumerate(tracks):
-        key = rule_of(track)
-        left = room.get(key, 0)
-        if left <= 0:
-            groups.setdefault(key, []).append([])
-            left = MAX_GROUP_KEYS
-        groups[key][-1].append(i)
-        room[key] = left - len(track.values)
-    parts = [numbers for group in groups.values() for numbers in group]
-    return (_flatten_keys(tuple(tracks[i] for i in numbers), np.array(numbers)) for numbers in parts)
+    for numbers in group_indices(map(rule_of, tracks)).values():
+        counts = [len(tracks[i].values) for i in numbers]
+        for part in _parts(counts):
+            some = numbers[part]
+            yield _flatten_keys(tuple([tracks[i] for i in some]), np.array(some), np.array(counts[part]))
 
 
-def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints) -> ConcatenatedTracks:
-    counts = np.array([len(track.values) for track in tracks])
+def _parts(counts: Sequence[int]) -> Iterator[slice]:
+    """Yield the parts of a group with these numbers of keys: each ends with the track that fills it."""
+    first, size = 0, 0
+    for end, count in enumerate(counts, 1):
+        size += count
+        if size >= MAX_GROUP_KEYS or end == len(counts):
+            yield slice(first, end)
+            first, size = end, 0
+
+
+def _flatten_keys(tracks: tuple[Track, ...], numbers: Ints, counts: Ints) -> ConcatenatedTracks:
     starts = np.cumsum(counts) - counts
-    times = _join([track.times for track in tracks])
+    times = _join([track.time_axis.times for track in tracks])
     return ConcatenatedTracks(tracks, numbers, counts, starts, times, *stack_values(tracks, _join))
 
 

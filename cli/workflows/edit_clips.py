@@ -133,7 +133,7 @@ def edit_together(
         new = {i: clip for i, clip in changed.items() if i in stale or not _is_same(clip, clips[i])}
         for note in notes({i: clips[i] for i in new}, new):
             reporter.info(f"note: {note}")
-        result = writer.replace_clips(document, new)
+        result = writer.replace_sharing(document, new)
         written = reader.clips(result, limited=False)
         edited = EditResult({i: clips[i] for i in chosen}, {i: written[i] for i in chosen}, None, 0.0)
         if not new:

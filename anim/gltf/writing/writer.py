@@ -46,6 +46,15 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, extension: s
     node's morph targets; NotFoundError for an unknown animation or node.
     replace_clips(document, {0: clip}): the first animation becomes `clip`
     """
+    new = replace_sharing(document, clips, extension=extension)
+    return new if new is document else replace(new, json=copy_json(new.json))
+
+
+def replace_sharing(document: Document, clips: Mapping[int, Clip], *, extension: str = "") -> Document:
+    """Return the document of `replace_clips`, but with objects in its JSON that are those of `document`.
+
+    For documents that are written and not edited in place: a copy of the JSON of many nodes takes time and memory.
+    """
     check_type(document, Document, "document")
     if not clips:
         return document
@@ -62,17 +71,16 @@ def replace_clips(document: Document, clips: Mapping[int, Clip], *, extension: s
         for i, animation in enumerate(json_array(document.json, "animations"))
     ]
     written = insert_accessors(document, animations, set(clips), pool.contents, extension, pool.sources)
-    json = copy_json(expand_matrices(written.json)[0])
+    json = expand_matrices(written.json)[0]
     if any(track.pointer is not None for clip in clips.values() for track in clip.tracks):
-        _name_extension(json, channel_targets.EXTENSION)
+        json = _name_extension(json, channel_targets.EXTENSION)
     return replace(written, json=json)
 
 
-def _name_extension(json: Json, name: str) -> None:
-    """Add an extension to `extensionsUsed`, in place: glTF requires it there."""
+def _name_extension(json: Json, name: str) -> Json:
+    """The JSON with an extension in `extensionsUsed`: glTF requires it there."""
     used: list[str] = json.get("extensionsUsed", [])
-    if name not in used:
-        json["extensionsUsed"] = [*used, name]
+    return json if name in used else {**json, "extensionsUsed": [*used, name]}
 
 
 def _check_index(number: object, count: int) -> int:

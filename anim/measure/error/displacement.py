@@ -98,8 +98,11 @@ class SkinnedDisplacement:
         count = len(products) * len(frames) // MAX_GROUP_VALUES + 1
         if count == 1:
             return vector_lengths(self._products(products, group, frames))
-        parts = np.array_split(products, count)
-        return np.concatenate([vector_lengths(self._products(part, group, frames)) for part in parts])
+        found, first = np.empty((len(products), len(frames)), np.result_type(products, self._moved)), 0
+        for part in np.array_split(products, count):
+            found[first : first + len(part)] = vector_lengths(self._products(part, group, frames))
+            first += len(part)
+        return found
 
     def _products(self, products: Floats, group: int, frames: Ints) -> Floats:
         """The vectors (V, 3, f) of some of a group's vertices, by their products."""

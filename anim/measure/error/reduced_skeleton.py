@@ -11,6 +11,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hierarchy, matrix, quaternion
 from anim.model import Clip, Skeleton, parse_weight_pointer
+from anim.model.skeleton import nearest_at_or_above
 from anim.sampling.pose import rest_pose
 from anim.sampling.world import local_by_node
 
@@ -92,13 +93,13 @@ def _reduce(one: Skeleton, other: Skeleton, moves: Bools, kept: Bools) -> Reduce
     local[moves] = IDENTITY
     rotation = np.where(moves[:, None], (0.0, 0.0, 0.0, 1.0), one.rotation)
     above = np.where(moves, -1, one.parents)
-    offsets, tops = matrix.accumulate_from_tops(local, above)
+    offsets = matrix.accumulate_from_tops(local, above, one.levels())
     turned = hierarchy.with_ancestors(above, kept & ~moves)
     rotations = _accumulate_rotations(rotation, np.where(turned, above, -1))
     nodes = np.flatnonzero(kept)
     index = np.full(len(one) + 1, len(nodes))  # of what is not kept: the origin
     index[nodes] = np.arange(len(nodes))
-    anchors = np.append(index[np.where(moves[tops], tops, -1)], len(nodes))
+    anchors = np.append(index[nearest_at_or_above(one.parents, moves)], len(nodes))
     parents = np.where(moves[nodes], index[one.parents[nodes]], anchors[nodes])
     versions = [_version(each, nodes, parents, moves, offsets, rotations) for each in (one, other)]
     return ReducedSkeleton(

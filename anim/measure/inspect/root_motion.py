@@ -38,8 +38,8 @@ def root_motions(
     """
     if not len(skeleton) or not clips:
         return [RootMotion(-1, 0.0, 0.0) for _ in clips]
-    depth = skeleton.derive(_depths)
-    roots = [_root(clip, depth, figure) if clip.end > clip.start else -1 for clip in clips]
+    ranks = skeleton.derive(_ranks)
+    roots = [_root(clip, ranks, figure) if clip.end > clip.start else -1 for clip in clips]
     blocks = (slice(first, first + BLOCK_CLIPS) for first in range(0, len(clips), BLOCK_CLIPS))
     ways = [way for one in blocks for way in _ways(skeleton, clips[one], roots[one])]
     return [_travel(*each) for each in zip(clips, roots, ways, strict=True)]
@@ -91,7 +91,7 @@ def root_motion_node(skeleton: Skeleton, clip: Clip) -> int:
     It is the translated node nearest to the root, if it has descendants and its displacement is at least 0.7 of the
     length of its path.
     """
-    root = _root(clip, skeleton.derive(_depths)) if len(skeleton) else -1
+    root = _root(clip, skeleton.derive(_ranks)) if len(skeleton) else -1
     return root if _leads(skeleton, clip, root) else -1
 
 
@@ -113,11 +113,10 @@ def _travel(clip: Clip, root: int, away: Floats) -> RootMotion:
     return RootMotion(root, distance, distance / (clip.end - clip.start))
 
 
-def _root(clip: Clip, depth: Floats, figure: AbstractSet[int] | None = None) -> int:
+def _root(clip: Clip, ranks: Floats, figure: AbstractSet[int] | None = None) -> int:
     """The translated node nearest to the root of the hierarchy."""
     keys = {track.node: track.values for track in clip.tracks if track.path == "translation" and track.node is not None}
-    nodes = sorted(node for node in keys if figure is None or node in figure)
-    from_root = [nodes[i] for i in np.argsort(depth[nodes], kind="stable").tolist()]
+    from_root = sorted(keys if figure is None else keys.keys() & figure, key=ranks.item)
     return next((node for node in from_root if _moves(keys[node])), -1)
 
 
@@ -126,7 +125,8 @@ def _moves(values: Floats) -> bool:
     return values.tobytes() != len(values) * values[0].tobytes() and bool((values != values[0]).any())
 
 
-def _depths(skeleton: Skeleton) -> Floats:
-    depth, levels = np.zeros(len(skeleton)), skeleton.levels()
-    depth[np.concatenate(levels)] = np.repeat(np.arange(len(levels)), [len(level) for level in levels])
-    return depth
+def _ranks(skeleton: Skeleton) -> Floats:
+    """The rank (N,) of each node: those nearest to the root of the hierarchy first, then by index."""
+    ranks = np.zeros(len(skeleton))
+    ranks[np.concatenate([np.sort(level) for level in skeleton.levels()])] = np.arange(len(skeleton))
+    return ranks

@@ -8,9 +8,8 @@ from itertools import chain
 from typing import NamedTuple
 
 from anim.gltf.document import Document, Json, json_array
-from anim.gltf.validation import buffer_layout
 from anim.gltf.writing.references import sampled_accessors, views_of_all
-from anim.measure.inspect.stored_bytes import stored_bytes
+from anim.measure.inspect.stored_bytes import stored_bytes, value_bytes
 
 
 class StorageCost(NamedTuple):
@@ -65,6 +64,4 @@ _encoder = jsonlib.JSONEncoder(separators=(",", ":"), ensure_ascii=False, check_
 
 
 def _size(accessor: Json) -> int:
-    if ("bufferView" not in accessor and "sparse" not in accessor) or accessor["type"] not in buffer_layout.COMPONENTS:
-        return 0
-    return int(accessor["count"]) * buffer_layout.element_size(accessor["componentType"], accessor["type"])
+    return value_bytes(accessor) if "bufferView" in accessor or "sparse" in accessor else 0

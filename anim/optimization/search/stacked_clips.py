@@ -15,6 +15,7 @@ from anim.maths import matrix
 from anim.measure.error.point_matrix import PointMatrix
 from anim.measure.error.point_rows import stack_points
 from anim.model import Skeleton
+from anim.model.skeleton import nearest_at_or_above
 from anim.optimization.search.playback import level_world_matrices, required_levels
 from anim.optimization.search.source_motion import PATHS, ROTATION, SourceMotion
 
@@ -145,8 +146,8 @@ def _rebind(
     local = np.zeros((len(skeleton), 3, 4))
     local[constant] = np.swapaxes(matrices, 1, 2)
     local[moves] = np.eye(4)[:3]
-    offsets, nearest = matrix.accumulate_from_tops(local, np.where(moves, -1, skeleton.parents))
-    points = points.rebind(nearest, offsets)
+    offsets = matrix.accumulate_from_tops(local, np.where(moves, -1, skeleton.parents), skeleton.levels())
+    points = points.rebind(nearest_at_or_above(skeleton.parents, moves), offsets)
     return points, required_levels(skeleton, points.nodes)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from anim.arrays import Floats
-from anim.maths import matrix
+from anim.maths import hierarchy, matrix
+from tests.anim.maths.test_hierarchy import levels_of
 
 
 def _whole(affine: np.typing.NDArray[np.float64]) -> np.typing.NDArray[np.float64]:
@@ -26,17 +28,21 @@ def test_what_is_flattened_stays_flat() -> None:
     np.testing.assert_allclose(back, [[0, 6, 7]], atol=1e-12)
 
 
-def test_products_from_tops_are_those_of_each_node_after_its_parent() -> None:
-    random, count = np.random.default_rng(1), 300
+@pytest.mark.parametrize("count", [300, 2000])
+def test_products_from_tops_are_those_of_each_node_after_its_parent(count: int) -> None:
+    """Also in a hierarchy that is deep and thin, whose levels are computed in sections."""
+    random = np.random.default_rng(1)
     rotation = random.normal(size=(count, 4))
     rotation /= np.linalg.norm(rotation, axis=1, keepdims=True)
     local = matrix.from_trs(random.normal(size=(count, 3)), rotation, np.ones((count, 3)))
-    parents = np.array([-1, *(int(random.integers(max(i - 3, 0), i)) for i in range(1, count))])
-    parents[[5, 170]] = -1
-    found, tops = matrix.accumulate_from_tops(local, parents)
+    whole = np.array([-1, *(int(random.integers(max(i - 3, 0), i)) for i in range(1, count))])
+    parents = whole.copy()
+    parents[[5, 170, count // 2]] = -1
+    levels = levels_of(whole.tolist())
+    assert hierarchy.is_deep(levels) == (count == 2000)
+    found = matrix.accumulate_from_tops(local, parents, levels)
     expected: list[Floats] = []
     for i, parent in enumerate(parents.tolist()):
-        whole = np.vstack((local[i], [0, 0, 0, 1]))
-        expected.append(whole if parent < 0 else expected[parent] @ whole)
-        assert tops[i] == (i if parent < 0 else tops[parent])
-    np.testing.assert_allclose(found, np.array(expected)[:, :3], atol=1e-10)
+        own = np.vstack((local[i], [0, 0, 0, 1]))
+        expected.append(own if parent < 0 else expected[parent] @ own)
+    np.testing.assert_allclose(found, np.array(expected)[:, :3], atol=1e-9)
