@@ -15,7 +15,7 @@ import numpy as np
 from anim.files.folder_lock import lock_folder
 from anim.gltf.io import images
 from anim.gltf.io.container import SUFFIXES
-from cli.workflows.check_config import matches
+from cli.io.path_patterns import matches
 from cli.workflows.run import own_files
 from cli.workflows.run.journal import Entries
 from cli.workflows.run.recipe import Recipe
