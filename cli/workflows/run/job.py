@@ -142,7 +142,7 @@ def run_steps(job: Job, messages: StepStreams, step_errors: list[str]) -> tuple[
     files: list[Path] = []
     data = EMPTY
     for number, step in enumerate(job.steps, 1):
-        streams = StepStreams(job.input, data, job.folder, job.cores)
+        streams = StepStreams(job.input, data, job.folder, job.cores, image_folder(job) if number > 1 else None)
         with use_streams(streams):
             code = main.run(step.words(argument_of(job.input) if number == 1 else PIPE))
         messages.messages += streams.messages
