@@ -16,15 +16,17 @@ class StepStreams:
     """Bytes and lines that one step reads and writes.
 
     name: of the input, for messages. input: stdin. folder: of relative paths. cores: number of processes that the step
-    may use, 0 for all. output, messages: bytes on stdout and lines on stderr. error: the largest one that the step
-    measured, in words; "" of one that measures none. files: read by name, also by the step's options, in order.
+    may use, 0 for all. images: folder of the images that `input` names, None for the first step. output, messages:
+    bytes on stdout and lines on stderr. error: the largest one that the step measured, in words; "" of one that
+    measures none. files: read by name, also by the step's options, in order.
     """
 
-    def __init__(self, name: str, input: Bytes, folder: Path, cores: int = 0) -> None:
+    def __init__(self, name: str, input: Bytes, folder: Path, cores: int = 0, images: Path | None = None) -> None:
         self.name = name
         self.input = input
         self.folder = folder
         self.cores = cores
+        self.images = images
         self.output: list[bytes] = []
         self.messages: list[str] = []
         self.error = ""

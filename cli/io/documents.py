@@ -53,7 +53,7 @@ def source(
     """
     name = called(path)
     try:
-        found = open_bytes(_stdin(resolver.read_gltf), name, opener) if path == PIPE else _open_file(path, opener)
+        found = _open_pipe(name, opener) if path == PIPE else _open_file(path, opener)
         repaired_note(found.document, name, reporter)
         _note_unknown_extensions(found.document, name, reporter, uses)
         yield found
@@ -255,6 +255,12 @@ def check_name(path: str) -> None:
     """Raise FormatError for an empty path, which would be the current folder."""
     if not path:
         raise FormatError("is no file name")
+
+
+def _open_pipe(name: str, opener: Opener) -> Source:
+    """The document on stdin; that of a step has its images where the first step found them."""
+    found = open_bytes(_stdin(resolver.read_gltf), name, opener)
+    return found if (step := step_streams()) is None else found._replace(folder=step.images)
 
 
 def _open_file(path: str, opener: Opener) -> Source:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from anim.errors import FormatError, NotFoundError
 from anim.gltf.io import container
 from cli.io import documents
+from cli.io.path_patterns import can_match_below
 
 
 class FoundFile(NamedTuple):
@@ -62,12 +63,24 @@ def _matches(pattern: str) -> list[FoundFile]:
     if not glob.has_magic(pattern):
         return [_named(pattern)]
     found = sorted(each for each in glob.glob(pattern, recursive=True) if os.path.isfile(each))
-    if not found:
-        raise NotFoundError(f"{pattern}: matches no file")
     folder = os.path.dirname(pattern)
     while glob.has_magic(folder):
         folder = os.path.dirname(folder)  # the part before the first wildcard: "in" of "in/**/*.glb"
+    _check_readable(Path(folder or "."), os.path.relpath(pattern, folder or "."))
+    if not found:
+        raise NotFoundError(f"{pattern}: matches no file")
     return [FoundFile(each, folder or ".", is_searched=True) for each in found]
+
+
+def _check_readable(folder: Path, pattern: str) -> None:
+    """Raise FormatError for a folder that can't be read and may have matching files: `glob` leaves them out.
+
+    pattern: from the folder.
+    """
+    for place, folders, _ in walk(folder):
+        above = Path(place).relative_to(folder)
+        visible = (each for each in folders if not each.startswith("."))  # as for wildcards
+        folders[:] = (each for each in visible if can_match_below((above / each).as_posix(), Path(pattern).as_posix()))
 
 
 def walk(folder: Path) -> Iterator[tuple[str, list[str], list[str]]]:

@@ -6,8 +6,6 @@ import glob
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
-from functools import cache
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -19,6 +17,7 @@ from anim.errors import AnimError
 from cli import units
 from cli.errors import UsageError
 from cli.io import output_names
+from cli.io.path_patterns import matches
 from cli.workflows import config_tables
 
 _SIZES = ("bytes", "animation_bytes")  # also as text with a unit, as --max-bytes
@@ -95,29 +94,6 @@ class CheckConfig:
 def _fixed_folder(pattern: str) -> str:
     """The folders of a pattern before the first part with a wildcard: "build" of "build/**/*.glb"."""
     return "/".join(takewhile(lambda part: not glob.has_magic(part), pattern.split("/")[:-1])) or "."
-
-
-def matches(path: str, pattern: str) -> bool:
-    """Return whether a path with "/" matches a pattern; "**" stands for any number of folders.
-
-    Each part of the pattern is compared once with each of the path.
-    """
-    parts, ends = PurePosixPath(path).parts, {0}  # numbers of parts that the pattern so far matches
-    for each in _pattern_parts(pattern):
-        if each == "**":
-            ends = set(range(min(ends), len(parts) + 1))
-        else:
-            ends = {end + 1 for end in ends if end < len(parts) and fnmatchcase(parts[end], each)}
-        if not ends:
-            return False
-    return len(parts) in ends
-
-
-@cache
-def _pattern_parts(pattern: str) -> tuple[str, ...]:
-    """The parts of a pattern, without a "**" behind another, which adds nothing."""
-    parts = PurePosixPath(pattern).parts
-    return tuple(part for part, before in zip(parts, ("", *parts), strict=False) if (part, before) != ("**", "**"))
 
 
 def nearest(folder: Path) -> CheckConfig:

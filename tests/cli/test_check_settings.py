@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from cli.workflows.check_config import matches
 from tests.cli.checking import codes
 from tests.cli.conftest import Call
 from tests.cli.running import refusal
@@ -257,30 +256,3 @@ def test_texts_of_thousands_of_dots_are_read(folder: Path, call: Call) -> None:
     names = [f"v1.2.{i}" for i in range(3000)]
     (folder / "pyproject.toml").write_text(f"[project]\nnames = {names}\n[tool.gltf-anim]\nx = 1\n")
     assert "unknown key 'x'" in refusal(call("check", "noop.glb"), 2)
-
-
-@pytest.mark.parametrize(
-    ("pattern", "path", "is_match"),
-    [
-        ("**", "a.glb", True),
-        ("**/*.glb", "a.glb", True),
-        ("**/*.glb", "a/b/c.glb", True),
-        ("**/b/**/*.glb", "a/b/c/d.glb", True),
-        ("**/b/**/*.glb", "b/d.glb", True),
-        ("**/b/**/*.glb", "a/d.glb", False),
-        ("a/**", "a/b/c.glb", True),
-        ("a/**", "b/c.glb", False),
-        ("*/*", "a/b.glb", True),
-        ("*/*", "a/b/c.glb", False),
-        ("*", "a/b.glb", False),
-        ("[ab]?.glb", "b1.glb", True),
-        ("*.glb", "A.GLB", False),
-        ("/".join(["**"] * 12) + "/zz.glb", "d/" * 18 + "a.glb", False),
-        ("/".join(["**/*"] * 9) + "/a.glb", "d/" * 30 + "a.glb", True),
-        ("/".join(["**/d"] * 12) + "/zz.glb", "d/" * 30 + "a.glb", False),
-        ("*d" * 20 + ".glb", "d" * 250, False),
-    ],
-)
-def test_patterns(pattern: str, path: str, is_match: bool) -> None:
-    """Patterns of many ** took minutes."""
-    assert matches(path, pattern) == is_match

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from base64 import b64encode
 from pathlib import Path
 
 import pytest
@@ -60,3 +61,15 @@ def test_a_script_knows_the_files_of_a_character(hero: Path, call: Call) -> None
     (hero / "gltf-anim.toml").unlink()
     write_recipe(hero, "from-euler --onto lib/hero.gltf", "optimize", match="crowd/*.bvh", out="build/{stem}.glb")
     assert "lib/hero.gltf: its image 'skin.png' is another file" in refusal(call("run", "--emit", "make"), 2)
+
+
+def test_a_later_step_takes_images_in(hero: Path, call: Call) -> None:
+    """They were missing for it, since its input is no file; a change of one makes another result."""
+    write_recipe(hero, "retime --speed 2", "convert --embed", match="lib/*.gltf", out="build/{stem}.glb")
+    for data in (OWN, FOREIGN):
+        (hero / "lib/skin.png").write_bytes(data)
+        run = call("run")
+        assert "1 file: 1 made" in run.err
+        assert "note" not in run.err
+        assert b64encode(data) in (hero / "build/hero.glb").read_bytes()
+        assert not (hero / "build/skin.png").exists()

@@ -103,6 +103,37 @@ def test_what_is_edited_while_others_are_made_is_no_output(
     assert output.read_bytes() == edited
 
 
+def test_what_is_edited_before_its_worker_is_heard_is_no_output(
+    two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its stamp when the result came, as after a long look at other files, was recorded as that of the output."""
+
+    def edit(job: Job) -> JobResult:
+        result = run_job(job)
+        (two_recipes / job.output).write_bytes(built("morph_cube"))
+        return result
+
+    monkeypatch.setattr(runs, "run_jobs", lambda jobs, *others: ((job, edit(job)) for job in jobs))
+    call("run").product()
+    (two_recipes / "crowd/arm 1.glb").unlink()
+    assert "that changed after its run (build/crowd/arm 1.glb): not deleted" in call("run", "--delete-stale").err
+
+
+@pytest.mark.parametrize("is_ended", [False, True])
+def test_an_output_with_an_edited_buffer_stays(is_ended: bool, folder: Path, call: Call) -> None:
+    """Only its .gltf was compared, and the edited .bin was deleted with it."""
+    write_crowd(folder, hero="biped")
+    write_recipe(folder, PLAIN, match="crowd/*.glb", out="build/{stem}.gltf")
+    call("run").product()
+    if is_ended:
+        (folder / CACHE / "outputs.json").unlink()
+    for name in ("arm 1", "hero"):
+        (folder / f"crowd/{name}.glb").unlink()
+    (folder / "build/hero.bin").write_bytes(b"edited")
+    call("run", "--delete-stale")
+    assert {path.name for path in (folder / "build").iterdir()} == {"hero.bin", "hero.gltf"}
+
+
 def test_an_output_that_another_run_writes_again_is_its_output(
     two_recipes: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -66,7 +66,7 @@ def test_the_record_has_outputs_as_the_last_run_wrote_them(made: Path, call: Cal
     write_crowd(made, hero="arm")
     (made / "crowd/cube.glb").unlink()
     assert "deleted" in call("run", "--delete-stale").err
-    ((name, (_, (size, _), _)),) = json.loads(record.read_text())["folders"][str(made)].items()
+    ((name, (_, (size, _), *_)),) = json.loads(record.read_text())["folders"][str(made)].items()
     assert (name, size) == ("build/crowd/hero.glb", (made / name).stat().st_size)
 
 

@@ -53,6 +53,16 @@ def test_a_folder_that_no_recipe_matches_may_be_unreadable(
     assert "made" in call("run").err
 
 
+def test_a_folder_too_deep_for_a_recipe_may_be_unreadable(
+    folder: Path, call: Call, refuse: Callable[[Path], None]
+) -> None:
+    """All of them below the fixed part of `match` ended the run, such as a system's own lost+found."""
+    (folder / "crowd/deep").mkdir()
+    write_recipe(folder, *PLAIN, match="crowd/*.glb")
+    refuse(folder / "crowd/deep")
+    assert "made" in call("run").err
+
+
 def test_images_stay_if_a_folder_may_need_them(folder: Path, call: Call, refuse: Callable[[Path], None]) -> None:
     made = run_with_a_deleted_input(folder, call)
     call("convert", "crowd/hero.glb", "crowd/hero.gltf").product()
@@ -69,7 +79,13 @@ def test_images_stay_if_a_folder_may_need_them(folder: Path, call: Call, refuse:
     assert "build/crowd/skin.png" in built_files(made)
 
 
-FOLDERS = ("check", "crowd"), ("inspect", "crowd"), ("convert", "crowd", "-o", "out/{path}")
+FOLDERS = (
+    ("check", "crowd"),
+    ("inspect", "crowd"),
+    ("convert", "crowd", "-o", "out/{path}"),
+    ("check", "crowd/**/*.glb"),
+    ("check", "crowd/*/*.glb"),
+)
 
 
 @pytest.mark.parametrize("command", FOLDERS)
@@ -79,3 +95,11 @@ def test_commands_on_folders_name_it(
     (folder / "crowd/deep").mkdir()
     refuse(folder / "crowd/deep")
     assert "crowd/deep: can't be read (permission denied)" in refusal(call(*command), 3)
+
+
+def test_a_pattern_names_no_folder_that_it_does_not_reach(
+    folder: Path, call: Call, refuse: Callable[[Path], None]
+) -> None:
+    (folder / "crowd/deep").mkdir()
+    refuse(folder / "crowd/deep")
+    assert call("inspect", "crowd/*.gl[b]").code == 0

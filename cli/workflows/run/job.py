@@ -29,6 +29,7 @@ from cli.reports import image_notes
 from cli.streams import StepStreams, use_streams
 from cli.text import Reporter
 from cli.workflows.run.cache import FileHashes, ResultCache, path_key
+from cli.workflows.run.output_stamps import OutputStamps, stamp_output
 from cli.workflows.run.places import check_output
 from cli.workflows.run.stamps import FileStatus, Stamp, stamp_files, stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import EDITING, Step
@@ -65,7 +66,7 @@ class JobResult:
     with its buffers, as `size` has those of the output. files: stamps by path of all other files read and written; None
     if one that was read was changed meanwhile, so that nobody knows which content the output is of. copies: images that
     were copied beside the output, by their paths from the folder of the settings. step_errors: the largest error that
-    each step measured, with its name: "resample max 2.1 mm (0.1 %)".
+    each step measured, with its name: "resample max 2.1 mm (0.1 %)". stamps: of the output, as soon as it was written.
     """
 
     code: int
@@ -77,6 +78,7 @@ class JobResult:
     files: Mapping[str, Stamp | None] | None = field(default_factory=dict)
     copies: tuple[str, ...] = ()
     step_errors: tuple[str, ...] = ()
+    stamps: OutputStamps | None = None
 
 
 class WrittenOutput(NamedTuple):
@@ -85,6 +87,7 @@ class WrittenOutput(NamedTuple):
     size: int = 0
     files: Mapping[str, Stamp | None] | None = None
     copies: tuple[str, ...] = ()
+    stamps: OutputStamps | None = None
 
 
 def run_job(job: Job) -> JobResult:
@@ -108,9 +111,9 @@ def run_job(job: Job) -> JobResult:
     with use_streams(streams):
         code = errors.run_guarded(work)
     seconds = time.perf_counter() - began
-    size, others, copies = written
+    size, others, copies, stamps = written
     messages = shorten(streams.messages)
-    return JobResult(code, messages, size, stamp, seconds, input_size(job), others, copies, tuple(step_errors))
+    return JobResult(code, messages, size, stamp, seconds, input_size(job), others, copies, tuple(step_errors), stamps)
 
 
 def shorten(messages: Sequence[str]) -> tuple[str, ...]:
@@ -139,7 +142,7 @@ def run_steps(job: Job, messages: StepStreams, step_errors: list[str]) -> tuple[
     files: list[Path] = []
     data = EMPTY
     for number, step in enumerate(job.steps, 1):
-        streams = StepStreams(job.input, data, job.folder, job.cores)
+        streams = StepStreams(job.input, data, job.folder, job.cores, image_folder(job) if number > 1 else None)
         with use_streams(streams):
             code = main.run(step.words(argument_of(job.input) if number == 1 else PIPE))
         messages.messages += streams.messages
@@ -181,7 +184,8 @@ def write_output(job: Job, product: Bytes, read: Iterable[str | Path], began_ns:
     with atomic.name_errors(Path(job.output)):  # as while somebody exchanges a folder with a link
         paths = [job.folder / each for each in read]
         size, copies = _write(job, product, paths)
-        return WrittenOutput(size, _stamp_companions(job, product, paths, began_ns), copies)
+        stamps = stamp_output(job.folder, job.output, copies)
+        return WrittenOutput(size, _stamp_companions(job, product, paths, began_ns), copies, stamps)
 
 
 def _write(job: Job, product: Bytes, spared: Sequence[Path]) -> tuple[int, tuple[str, ...]]:

@@ -6,7 +6,7 @@ import io
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -27,7 +27,7 @@ class JournalEntry:
     of an earlier version. size: bytes of the output with its buffers.
     status: MADE, CACHED, DONE_BEFORE (in an earlier run that is resumed) or FAILED.
     messages: of failed files, else warnings and notes. copies: images that were copied beside the output.
-    settings: name of the settings file; "" in an earlier version.
+    settings: name of the settings file; "" in an earlier version. buffers: stamps by path of the output's own.
     """
 
     input: str
@@ -43,6 +43,7 @@ class JournalEntry:
     messages: tuple[str, ...] = ()
     copies: tuple[str, ...] = ()
     settings: str = ""
+    buffers: dict[str, Stamp] = field(default_factory=dict)
 
 
 Entries: TypeAlias = Mapping[tuple[str, str], JournalEntry]  # the last ones, by input and output
@@ -114,6 +115,7 @@ def _entry(value: dict[str, Any]) -> JournalEntry:
     parsed: dict[str, Any] = {key: _stamp(value[key]) for key in ("input_stamp", "output_stamp") if key in value}
     if value.get("files") is not None:
         parsed["files"] = {path: _stamp(stamp) for path, stamp in value["files"].items()}
+    parsed["buffers"] = {path: parse_stamp(stamp) for path, stamp in value.get("buffers", {}).items()}
     messages, copies = value.get("messages", []), value.get("copies", [])
     texts = [*(value[key] for key in ("input", "output", "recipe", "status")), value.get("settings", "")]
     are_lists = isinstance(messages, list) and isinstance(copies, list)

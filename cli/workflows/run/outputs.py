@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -15,9 +16,10 @@ import numpy as np
 from anim.files.folder_lock import lock_folder
 from anim.gltf.io import images
 from anim.gltf.io.container import SUFFIXES
-from cli.workflows.check_config import matches
+from cli.io.path_patterns import matches
 from cli.workflows.run import own_files
 from cli.workflows.run.journal import Entries
+from cli.workflows.run.output_stamps import OutputStamps, are_unchanged
 from cli.workflows.run.recipe import Recipe
 from cli.workflows.run.stamps import Stamp, parse_stamp, stamp_of
 
@@ -29,31 +31,35 @@ T = TypeVar("T")
 
 
 class RecordedOutput(NamedTuple):
-    """An output as it was written. input: of its job. settings: name of the file with the recipe."""
+    """An output as it was written. input: of its job. settings: name of the file with the recipe.
+
+    buffers: stamps of its buffers by name; none in records of earlier versions.
+    """
 
     input: str
     stamp: Stamp
     settings: str
+    buffers: Mapping[str, Stamp] = MappingProxyType({})
 
 
 @dataclass
 class WrittenFiles:
     """Files of a run, from the folder of the settings.
 
-    inputs: by output, of those that are complete. copies: images that were copied beside them. stamps: of all of these
-    when they were done. Who edits one while others are made has changed it: its stamp at the end is no output's.
+    inputs: by output, of those that are complete. stamps: of these when each was written, and copies of the images that
+    were copied beside them. Who edits one while others are made has changed it: its stamp at the end is no output's.
     """
 
     inputs: dict[str, str] = field(default_factory=dict)
-    copies: set[str] = field(default_factory=set)
-    stamps: dict[str, Stamp] = field(default_factory=dict)
+    stamps: dict[str, OutputStamps] = field(default_factory=dict)
+    copies: dict[str, Stamp] = field(default_factory=dict)
 
-    def add(self, folder: Path, output: str, input: str, copies: Collection[str]) -> None:
-        """Add an output as it is now, with its images."""
+    def add(self, output: str, input: str, stamps: OutputStamps | None) -> None:
+        """Add an output with its stamps; None if it is gone already."""
         self.inputs[output] = input
-        self.copies |= set(copies)
-        stamps = {name: stamp_of(folder / name) for name in (output, *copies)}
-        self.stamps |= {name: stamp for name, stamp in stamps.items() if stamp is not None}
+        if stamps is not None:
+            self.stamps[output] = stamps
+            self.copies |= stamps.copies
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,10 @@ class OutputRecord:
         """Return whether a file is an output as it was written."""
         return name in self.outputs and stamp_of(self.folder / name) == self.outputs[name].stamp
 
+    def is_whole(self, name: str) -> bool:
+        """Return whether an output is as it was written, with its buffers."""
+        return self.is_unchanged(name) and are_unchanged(self.folder, self.outputs[name].buffers)
+
     def is_unchanged_copy(self, name: str) -> bool:
         """Return whether a file is an image as it was copied."""
         return name in self.copies and stamp_of(self.folder / name) == self.copies[name]
@@ -98,14 +108,11 @@ class OutputRecord:
 
         Another run may have added its own since this record was read. Raises OutputError.
         """
-        stamps = written.stamps
         new = {
-            name: RecordedOutput(source, stamps[name], self.settings)
-            for name, source in written.inputs.items()
-            if name in stamps
+            name: RecordedOutput(written.inputs[name], stamps.output, self.settings, stamps.buffers)
+            for name, stamps in written.stamps.items()
         }
-        copied = {name: stamps[name] for name in written.copies if name in stamps}
-        self._update({**self.unsaved, **new}, {**self.unsaved_copies, **copied})
+        self._update({**self.unsaved, **new}, {**self.unsaved_copies, **written.copies})
 
     def forget(self, names: Collection[str]) -> None:
         """Remove outputs and images from the record as it is now. Raises OutputError."""
@@ -151,7 +158,7 @@ def read_outputs(path: Path, settings: Path, last: Entries) -> OutputRecord:
         name, stamp = entry.output, entry.output_stamp
         if stamp is None or not _is_output_name(name):
             continue
-        found = RecordedOutput(entry.input, stamp, entry.settings)
+        found = RecordedOutput(entry.input, stamp, entry.settings, entry.buffers)
         if outputs.get(name) != found and stamp_of(folder / name) == stamp:
             outputs[name] = unsaved[name] = found
     return OutputRecord(path, folder, settings.name, outputs, {**copies, **unsaved_copies}, unsaved, unsaved_copies)
@@ -176,9 +183,10 @@ def _outputs_of(content: Mapping[str, Any], folder: Path) -> dict[str, RecordedO
     outputs: dict[str, RecordedOutput] = {}
     for name, value in _entries(content, FOLDERS, folder):
         with suppress(ValueError, TypeError):
-            source, stamp, settings = value
+            source, stamp, settings, *more = value
+            buffers = {key: parse_stamp(each) for key, each in dict(*more).items()}
             if _is_output_name(name) and isinstance(source, str) and isinstance(settings, str):
-                outputs[name] = RecordedOutput(source, parse_stamp(stamp), settings)
+                outputs[name] = RecordedOutput(source, parse_stamp(stamp), settings, buffers)
     return outputs
 
 

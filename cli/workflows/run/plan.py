@@ -11,7 +11,7 @@ from anim.files.special_files import is_device_or_pipe
 from anim.gltf.io import container
 from cli.errors import UsageError
 from cli.io import input_files
-from cli.workflows.check_config import matches
+from cli.io.path_patterns import can_match_below, matches
 from cli.workflows.run import places
 from cli.workflows.run.job import Job
 from cli.workflows.run.order import group_jobs
@@ -29,8 +29,8 @@ def plan_jobs(
     earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
     named: whether the recipes are named by the command line: then files need not match.
     Outputs are never inputs: "*.glb" would match those beside their inputs. Raises UsageError for two files with one
-    output, NotFoundError without any file, and FormatError for a folder that can't be read: outputs of its files are no
-    stale ones.
+    output, NotFoundError without any file, and FormatError for a folder that can't be read and may have matching files:
+    their outputs are no stale ones.
     """
     given = [_relative(book, each) for each in input_files.expand(files)]
     jobs: dict[str, Job] = {}
@@ -103,7 +103,8 @@ def _files(book: RecipeBook, recipe: Recipe) -> Iterator[str]:
     for folder, folders, names in input_files.walk(book.folder / _fixed_folder(recipe.match, "*?[")):
         relative = Path(folder).relative_to(book.folder).as_posix()
         prefix = "" if relative == "." else f"{relative}/"
-        folders[:] = sorted(each for each in folders if not each.startswith(".") and prefix + each != outputs)
+        visible = (each for each in folders if not each.startswith(".") and prefix + each != outputs)
+        folders[:] = sorted(each for each in visible if can_match_below(prefix + each, recipe.match))
         for name in sorted(names):
             if name.startswith(".") or (is_gltf and not name.lower().endswith(container.SUFFIXES)):
                 continue

@@ -30,6 +30,7 @@ from cli.workflows.run.job import (
 )
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
 from cli.workflows.run.order import group_jobs, keys_read
+from cli.workflows.run.output_stamps import stamp_output
 from cli.workflows.run.outputs import WrittenFiles
 from cli.workflows.run.places import output_key
 from cli.workflows.run.stamps import stamp_of, stamp_read, status_of
@@ -105,7 +106,10 @@ class RecipeRun:
             if done is not None:
                 before = input_size(job) if self.reporter.verbose else 0  # for the line of --verbose
                 files = done.files or {}
-                result = JobResult(errors.DONE, done.messages, done.size, done.input_stamp, 0.0, before, files)
+                stamps = stamp_output(job.folder, job.output)
+                result = JobResult(
+                    errors.DONE, done.messages, done.size, done.input_stamp, 0.0, before, files, stamps=stamps
+                )
                 self._record(job, result, DONE_BEFORE)
             elif self.cache is None:
                 yield job
@@ -147,7 +151,8 @@ class RecipeRun:
             if others is not None:
                 others.pop(os.path.normpath(job.input))
             before, measured = input_size(job), tuple(record.step_errors)
-            return JobResult(errors.DONE, (), record.size, stamp, 0.0, before, others, step_errors=measured)
+            stamps = stamp_output(job.folder, job.output)
+            return JobResult(errors.DONE, (), record.size, stamp, 0.0, before, others, (), measured, stamps)
         product = cache.product(record)
         if product is None:
             return None
@@ -161,9 +166,9 @@ class RecipeRun:
         with use_streams(streams):
             code = run_guarded(write)
         seconds = time.perf_counter() - began
-        size, files, copies = written
+        size, files, copies, stamps = written
         messages, measured = tuple(streams.messages), tuple(record.step_errors)
-        return JobResult(code, messages, size, stamp, seconds, input_size(job), files, copies, measured)
+        return JobResult(code, messages, size, stamp, seconds, input_size(job), files, copies, measured, stamps)
 
     def _recipe(self, job: Job) -> str:
         if job.steps not in self._recipes:
@@ -175,7 +180,7 @@ class RecipeRun:
         if status == FAILED:
             self._failed[output_key(job.output)] = job.output, result.code
         else:
-            self.written.add(job.folder, job.output, job.input, result.copies)
+            self.written.add(job.output, job.input, result.stamps)
         self.code = max(self.code, result.code)
         self._progress.close()
         self._report(job, result, status)
@@ -190,10 +195,11 @@ class RecipeRun:
                 round(result.seconds, 3),
                 result.size,
                 result.stamp,
-                None if status == FAILED else self.written.stamps.get(job.output),
+                None if result.stamps is None else result.stamps.output,
                 None if result.files is None else dict(result.files),
                 result.messages if status == FAILED else tuple(filter(is_notice, result.messages)),
                 result.copies,
+                buffers={} if result.stamps is None else dict(result.stamps.buffers),
             )
         )
 

@@ -71,7 +71,7 @@ def find_stale(record: OutputRecord, book: RecipeBook, jobs: Sequence[Job]) -> t
         return [], []
     needed = {_identity(record.folder / name) for name in (*outputs, *_files_read(book, jobs))}
     unused = [name for name in found if _identity(record.folder / name) not in needed]
-    return list(filter(record.is_unchanged, unused)), [each for each in unused if not record.is_unchanged(each)]
+    return list(filter(record.is_whole, unused)), [each for each in unused if not record.is_whole(each)]
 
 
 def _files_read(book: RecipeBook, jobs: Iterable[Job]) -> Iterator[str]:
