@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from anim.gltf.document import Document, Json
-from anim.measure.inspect.storage_cost import StorageCost, storage_costs
+from anim.measure.inspect.storage_cost import StorageCost, animation_bytes, storage_costs
+from anim.measure.inspect.stored_bytes import stored_bytes
 from tests.files import REAL, SHARED, mark_slow, opened_path
 
 KEYS = {"componentType": 5126, "count": 2}
@@ -55,6 +56,7 @@ def test_by_hand() -> None:
     assert alone == [StorageCost(size, json_bytes(SHARING, [i])) for i, size in enumerate(data)]
     assert together == StorageCost(8 + 24 + 24, json_bytes(SHARING, [0, 1]))
     assert together.total == together.data + together.json
+    assert animation_bytes(Document(SHARING, ())) == stored_bytes(Document(SHARING, ())) + together.json
 
 
 def test_no_animations_cost_nothing() -> None:
@@ -71,6 +73,7 @@ def test_real_files_part_by_part(name: str) -> None:
     every = list(range(len(document.json["animations"])))
     assert [each.json for each in alone] == [json_bytes(document.json, [i]) for i in every]
     assert together.json == json_bytes(document.json, every)
+    assert animation_bytes(document) == stored_bytes(document) + together.json
     sizes = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
     widths = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5126: 4}
     _, accessors, _ = listed(document.json, every)
