@@ -11,10 +11,10 @@ from typing import Annotated
 
 import typer
 
-from anim.errors import NotFoundError, OutputError
+from anim.errors import OutputError
 from anim.units import plural
 from cli import errors, units
-from cli.errors import UsageError
+from cli.errors import NoFileError, UsageError
 from cli.io import documents
 from cli.options import common
 from cli.text import Reporter, format_bytes
@@ -129,7 +129,7 @@ def command(
     is_all, chosen = not (inputs or recipe), chosen_recipes(book, recipe or ())
     try:
         planned = plan_jobs(book, chosen, inputs or (), record, named=bool(recipe))
-    except NotFoundError:  # as after all inputs were deleted
+    except NoFileError:  # as after all inputs were deleted
         _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
             report_stale(record, book, (), outputs.WrittenFiles(), reporter, delete=delete_stale)
