@@ -57,6 +57,8 @@ class OptimizeReport:
             return None
         if self.found.unchanged:
             return "optimized like this before"
+        if not self.clips:
+            return "it has no clips"
         if self.max_bytes is not None and self.size_before <= self.max_bytes:
             return "it fits --max-bytes as it is, without an error (--max-error alone gives the fewest bytes)"
         kept = retained_keys(self.before, self.found.solutions)
