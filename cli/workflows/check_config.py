@@ -174,8 +174,8 @@ def _budget(path: Path, entry: Any, number: int) -> Budget:
     except UsageError as error:
         raise UsageError(f"{where}: `against` of [[budget]] is {error}", help=_AGAINST_HELP) from None
     limits = tuple((name, _limit(where, name, entry[name])) for name in MEASURES if name in entry)
-    error, against = entry.get("error", ""), entry.get("against", "")
-    return Budget(entry["match"], limits, error, against, f"budget {number} of {_from_here(path)}")
+    text, against = entry.get("error", ""), entry.get("against", "")
+    return Budget(entry["match"], limits, text, against, f"budget {number} of {_from_here(path)}")
 
 
 def _limit(where: str, name: str, value: float | str) -> float:
