@@ -117,10 +117,7 @@ class FileChecker:
         except UsageError:
             raise
         except AnimError as error:
-            fault = checked_files.fault_of(path, error)
-            if path != documents.PIPE and not Path(path).exists():
-                fault.help = "name another file"
-            faults = (fault,)
+            faults = (checked_files.fault_of(path, error),)
             self._report_faults(name, faults)
         self.refused += [(name, fault) for fault in faults[:1]]
 
