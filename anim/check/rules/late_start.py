@@ -13,7 +13,6 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document
 from anim.measure.inspect.report import ClipReport
-from anim.measure.loops.loop_criteria import VISIBLE_GAP_PER_SIZE
 from anim.model import Track
 
 UNITY = "unity"
@@ -21,6 +20,7 @@ LATE_TRACKS = "late tracks"
 ADD_KEYS = "to add keys at 0 s: gltf-anim check FILE --fix --select GA105 --target unity"
 REBASE = "if unintended, so that it loops without a pause: gltf-anim trim IN OUT --rebase"
 MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display shows them
+MAX_LOOP_GAP = 0.001  # of the model's size; GA107 finds larger ones
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -38,7 +38,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 def _loops(file: CheckedFile, report: ClipReport) -> bool:
     """Return whether a clip loops from its first key, but for a frame: a pause before that key would be part of it."""
-    return report.index in file.missing_frames or report.seam_m <= VISIBLE_GAP_PER_SIZE * file.diagonal
+    return report.index in file.missing_frames or report.seam_m <= MAX_LOOP_GAP * file.diagonal
 
 
 def problem(found: Sequence[Occurrence]) -> str:
