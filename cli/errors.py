@@ -48,11 +48,16 @@ class RefusedOutputError(UsageError):
     """
 
 
+class NoFileError(FormatError):
+    """A folder, a pattern or a recipe names no file: exit 3, as for a name of no file."""
+
+
 class CheckError(AnimError):
     """A requested check failed: exit 6."""
 
 
 CODES[UsageError] = CODES[RefusedOutputError] = USAGE
+CODES[NoFileError] = FORMAT
 CODES[CheckError] = CHECK
 
 

@@ -86,7 +86,7 @@ app = typer.Typer(
     add_completion=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="IN and OUT may be '-' for a pipe (GLB). Exit codes: 0 done, 2 wrong usage, 3 invalid input, or a file that "
-    "can't be read or written, 4 unsupported input, 5 no such clip, node or mesh, 6 a check failed.",
+    "isn't there or can't be read or written, 4 unsupported input, 5 no such clip, node or mesh, 6 a check failed.",
 )
 
 

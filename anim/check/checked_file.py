@@ -31,7 +31,8 @@ class CheckedFile:
     """A file to check. contents: its readable parts. facts: their report; rules look at its clips only.
 
     missing: label, JSON pointer and problem of each file that it names and that isn't there.
-    budget: limits by name (see `budget`). source: the file that its error is measured against, if there is a limit.
+    budget: limits by name (see `budget`). budget_place: the place of these limits in the settings, "" if unknown.
+    source: the file that its error is measured against, if there is a limit.
     """
 
     contents: FileContents
@@ -39,6 +40,7 @@ class CheckedFile:
     missing: Sequence[tuple[str, str, str]] = ()
     budget: Mapping[str, float] = field(default_factory=dict)
     source: CheckedFile | None = None
+    budget_place: str = ""
 
     @property
     def document(self) -> Document:

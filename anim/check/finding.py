@@ -27,7 +27,7 @@ class Occurrence:
     label: the part ("clip 'walk'"). pointer: its JSON pointer. count: number of faults in it. value: the largest of
     them, in the unit of the rule. problem: the observation, for rules whose `Rule.problem` does not write it.
     number: index of the part among its kind (clip, node, skin), name: its name. time_s, node: time and node of the
-    largest or first fault in a clip, where it has one.
+    largest or first fault in a clip, where it has one. is_fixable: False if the rule's fix leaves this one.
     """
 
     label: str
@@ -40,6 +40,7 @@ class Occurrence:
     name: str = ""
     time_s: float | None = None
     node: int | None = None
+    is_fixable: bool = True
 
 
 class Finding(NamedTuple):

@@ -83,7 +83,7 @@ class _Fixer:
         """Apply each fix once; return whether the file changed."""
         before = self.file.document
         for rule in self._rules():
-            found = rule.occurrences(self.file, self.selection.values(rule))
+            found = [each for each in rule.occurrences(self.file, self.selection.values(rule)) if each.is_fixable]
             if found:
                 try:
                     self._apply(rule, found)

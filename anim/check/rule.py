@@ -103,7 +103,8 @@ class Rule(NamedTuple):
         problem = first.problem if self.problem is None else self.problem(found)
         advice = first.advice or clip_advice(self.advice, clips, [each.number for each in found])
         where = first.label if len(found) == 1 else _labels(found)
-        fixable = "" if self.fix is None else ("safe" if self.fix.is_safe else "unsafe")
+        is_fixable = any(each.is_fixable for each in found)
+        fixable = "" if self.fix is None or not is_fixable else ("safe" if self.fix.is_safe else "unsafe")
         return Finding(self.name, severity, where, problem, advice, self.code, first.pointer, first.time_s, fixable)
 
 

@@ -205,7 +205,7 @@ def _report(
     if bad and not worst:
         order = list(Severity)  # most severe first
         name, first = min(bad, key=lambda each: order.index(each[1].severity))
-        more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+        more = check_report.count_failures([path for path, _ in bad])
         error = CheckError(f"{name}: {first.severity} {first.code} {first.name}: {first.where}: {first.problem}{more}")
         return errors.report_error(error, is_shown=is_read and first.severity is Severity.ERROR)
     return worst

@@ -24,6 +24,7 @@ from cli.errors import CheckError, UsageError
 from cli.io import documents, input_files, stdout
 from cli.options import common
 from cli.reports import inspect_report, json_report
+from cli.reports.check_report import count_failures
 from cli.reports.inspect_report import Inspected, Smoothness
 from cli.text import Reporter
 from cli.workflows import checked_files
@@ -154,7 +155,7 @@ def _check(done: list[Inspected], limit: Severity, *, is_shown: bool) -> int:
     ]
     if bad:
         name, first = bad[0]
-        more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+        more = count_failures([path for path, _ in bad])
         error = CheckError(f"{name}: {first.severity} {first.name}: {first.where}: {first.problem}{more}")
         return errors.report_error(error, is_shown=is_shown and first.severity is Severity.ERROR)
     return errors.DONE

@@ -58,7 +58,7 @@ def command(
             "--max-error",
             metavar="LENGTH",
             help="Maximum error of any vertex: 0.5mm, 2cm, 0 (lossless), or a part of the model's size; "
-            "0.01% by default.",
+            "0.01% by default. Alone, the result is the smallest file within it.",
         ),
     ] = None,
     max_bytes: Annotated[
@@ -66,8 +66,8 @@ def command(
         typer.Option(
             "--max-bytes",
             metavar="SIZE",
-            help="Maximum file size, like 800kB: the smallest error found that fits, up to --max-error if given, "
-            "else 10 % of the model's size.",
+            help="Maximum file size, like 800kB: the result has the smallest error found that fits, not the fewest "
+            "bytes. Exit 6 if that error is above --max-error, else 10 % of the model's size.",
         ),
     ] = None,
     meshopt: Annotated[

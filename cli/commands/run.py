@@ -11,10 +11,10 @@ from typing import Annotated
 
 import typer
 
-from anim.errors import NotFoundError
+from anim.errors import OutputError
 from anim.units import plural
 from cli import errors, units
-from cli.errors import UsageError
+from cli.errors import NoFileError, UsageError
 from cli.io import documents
 from cli.options import common
 from cli.text import Reporter, format_bytes
@@ -60,7 +60,12 @@ def command(
             help=f"Folder of results and journal.  [default: {caching.NAME} beside the settings]",
         ),
     ] = None,
-    no_cache: Annotated[bool, typer.Option("--no-cache", help="Keep no results, and use none.")] = False,
+    no_cache: Annotated[
+        bool,
+        typer.Option(
+            "--no-cache", help="Keep no results, and use none; where no journal can be written, the run has none."
+        ),
+    ] = False,
     cache_size: Annotated[
         str,
         typer.Option(
@@ -124,7 +129,7 @@ def command(
     is_all, chosen = not (inputs or recipe), chosen_recipes(book, recipe or ())
     try:
         planned = plan_jobs(book, chosen, inputs or (), record, named=bool(recipe))
-    except NotFoundError:  # as after all inputs were deleted
+    except NoFileError:  # as after all inputs were deleted
         _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
             report_stale(record, book, (), outputs.WrittenFiles(), reporter, delete=delete_stale)
@@ -138,21 +143,28 @@ def command(
             documents.write_text(script.encode(errors="surrogateescape"))  # bytes of names that are not UTF-8
         return code
     results = caching.ResultCache(folder)
-    results.prepare()
-    record.save_unsaved()  # before a new journal is begun
     processes = jobs or os.cpu_count() or 1
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
         path, settings = folder / journals.NAME, book.path.name
-        journal = stack.enter_context(journals.open_journal(path, settings, len(planned), last, resume=resume))
+        try:
+            results.prepare()
+            record.save_unsaved()  # before a new journal is begun
+            journal = stack.enter_context(journals.open_journal(path, settings, len(planned), last, resume=resume))
+        except OutputError as error:
+            if not no_cache or resume or delete_stale:
+                raise
+            reporter.info(f"note: --resume and --delete-stale will not know of this run: {error}")
+            journal = journals.Journal(path, None, settings, {})
         run = RecipeRun(planned, journal, None if no_cache else results, reporter, processes, cluster)
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:
         _prune(results, limit, reporter)
-    if is_all:
-        report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
-    else:
-        record.save(run.written)
+    if journal.file is not None:
+        if is_all:
+            report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
+        else:
+            record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written.inputs]
     return max(code, _check(written, quiet=quiet)) if check else code
 

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from anim.errors import FormatError, NotFoundError
+from anim.errors import FormatError
 from anim.gltf.io import container
+from cli.errors import NoFileError
 from cli.io import documents
 from cli.io.path_patterns import can_match_below
 
@@ -27,7 +28,7 @@ class FoundFile(NamedTuple):
 def expand(inputs: Sequence[str]) -> list[str]:
     """Return the files of all inputs, each once: files as they are, of folders all glTF files below them.
 
-    A pattern is for shells that do not expand it, or for "**". Raises NotFoundError if one matches nothing, and
+    A pattern is for shells that do not expand it, or for "**". Raises NoFileError if one matches nothing, and
     FormatError for a folder that can't be read.
     """
     return [found.path for found in find(inputs)]
@@ -48,7 +49,7 @@ def _find_one(path: str) -> list[FoundFile]:
     if os.path.isdir(path):  # False, not an error, for names that no file can have
         found = sorted(_in_folder(Path(path)))
         if not found:
-            raise NotFoundError(f"{path}: has no {' or '.join(container.SUFFIXES)} file")
+            raise NoFileError(f"{path}: has no {' or '.join(container.SUFFIXES)} file")
         return [FoundFile(each, path, is_searched=True) for each in found]
     return _matches(path) if not os.path.lexists(path) else [_named(path)]
 
@@ -68,7 +69,7 @@ def _matches(pattern: str) -> list[FoundFile]:
         folder = os.path.dirname(folder)  # the part before the first wildcard: "in" of "in/**/*.glb"
     _check_readable(Path(folder or "."), os.path.relpath(pattern, folder or "."))
     if not found:
-        raise NotFoundError(f"{pattern}: matches no file")
+        raise NoFileError(f"{pattern}: matches no file")
     return [FoundFile(each, folder or ".", is_searched=True) for each in found]
 
 

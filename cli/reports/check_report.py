@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -9,13 +10,14 @@ from itertools import groupby
 from anim.check.baseline import FileFinding, fingerprint
 from anim.check.finding import Finding, Severity
 from anim.errors import AnimError
-from anim.units import plural
+from anim.units import list_some, plural
 from cli import tables
 from cli.reports import json_report
 from cli.tables import escape_control
 
 SCHEMA = 1
 SOURCE = "source"  # begins the position of errors in the source of a budget
+MAX_FAILED_FILES = 10  # in the line about a check that failed
 MAX_OF_RULE = 3  # findings of a rule listed per file in the text
 MAX_SUMMARY_BYTES = 1_000_000  # of a job summary on GitHub, 1 MiB
 MARKDOWN_ESCAPES = {ord(c): f"&#{ord(c)};" if c in "<>|&" else f"\\{c}" for c in "\\`*_{}[]<>#|~&"}
@@ -61,6 +63,15 @@ def error_text(report: CheckReport) -> str:
     """Return only the errors of the text, "" without one: even a quiet check shows them."""
     lines = _findings([each for each in report.found if each[1].severity is Severity.ERROR])
     return "".join(f"{escape_control(line)}\n" for line in lines)
+
+
+def count_failures(names: Sequence[str]) -> str:
+    """Return words on the other findings that fail a check, after the first one. names: the file of each finding."""
+    counts = Counter(names)
+    if len(counts) < 2:
+        return f" and {len(names) - 1} more" if len(names) > 1 else ""
+    listed = list_some([f"{name} {count}" for name, count in counts.items()], MAX_FAILED_FILES)
+    return f"; {len(names)} findings in {len(counts)} files: {listed}"
 
 
 def _findings(listed: Sequence[FileFinding]) -> list[str]:

@@ -57,8 +57,10 @@ class OptimizeReport:
             return None
         if self.found.unchanged:
             return "optimized like this before"
+        if not self.clips:
+            return "it has no clips"
         if self.max_bytes is not None and self.size_before <= self.max_bytes:
-            return "it fits --max-bytes as it is, without an error (--max-error alone makes it as small as that allows)"
+            return "it fits --max-bytes as it is, without an error (--max-error alone gives the fewest bytes)"
         kept = retained_keys(self.before, self.found.solutions)
         return f"no smaller file within the bound{'; ' if kept else ''}{kept}"
 
@@ -104,7 +106,7 @@ def lines(about: OptimizeReport, *, dry_run: bool) -> list[str]:
         format_duration(about.seconds),
     ]
     kept = retained_keys(about.before, about.found.solutions)
-    return [", ".join(summary) + dry, *_policy(about), *([f"note: {kept}"] if kept else [])]
+    return [", ".join(summary) + dry, *_goal(about), *_policy(about), *([f"note: {kept}"] if kept else [])]
 
 
 def warnings(about: OptimizeReport) -> list[str]:
@@ -179,6 +181,14 @@ def _earlier(about: OptimizeReport) -> list[str]:
     if not about.optimized_before:
         return []
     return ["the input was optimized before; errors are measured from it, not from its source"]
+
+
+def _goal(about: OptimizeReport) -> list[str]:
+    """Line on a limit of bytes, which is no search for the fewest bytes."""
+    if about.max_bytes is None:
+        return []
+    limit = f"--max-bytes {format_bytes(about.max_bytes)}"
+    return [f"  the smallest error found that fits {limit}; --max-error alone gives the fewest bytes"]
 
 
 def _policy(about: OptimizeReport) -> list[str]:

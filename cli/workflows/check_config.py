@@ -39,12 +39,13 @@ _AGAINST_HELP = "{subfolder}/{name} is the path below the folder of match: 'a/b.
 @dataclass(frozen=True)
 class Budget:
     """Limits of matching files. error: as text, "0.5mm" or "0.1%"; against: the source, with {path}, {folder},
-    {name}, {stem} or {subfolder}."""
+    {name}, {stem} or {subfolder}. place: number and file, "budget 2 of build/gltf-anim.toml"."""
 
     match: str
     limits: tuple[tuple[str, float], ...]
     error: str = ""
     against: str = ""
+    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
         config_tables.check_keys(path, "check.files", entry, _KEYS["check.files"])
         if "match" not in entry:
             raise UsageError(f"{path}: [[check.files]] has no match")
-    budgets = tuple(_budget(path, entry) for entry in table.get("budget", ()))
+    budgets = tuple(_budget(path, entry, number) for number, entry in enumerate(table.get("budget", ()), 1))
     try:
         fail_on = Severity(about["fail-on"]) if "fail-on" in about else None
     except ValueError:
@@ -136,23 +137,33 @@ def _config(path: Path, table: dict[str, Any]) -> CheckConfig:
     )
 
 
-def _budget(path: Path, entry: Any) -> Budget:
-    config_tables.check_keys(path, "budget", entry, _KEYS["budget"])
+def _budget(path: Path, entry: Any, number: int) -> Budget:
+    where = f"{path}: budget {number}"
+    config_tables.check_keys(where, "budget", entry, _KEYS["budget"])
     for key in ("match", *(("against",) if "error" in entry else ())):
         if key not in entry:
-            raise UsageError(f"{path}: [[budget]] has no {key}")
+            raise UsageError(f"{where}: [[budget]] has no {key}")
     if "\0" in entry.get("against", ""):
-        raise UsageError(f"{path}: `against` of [[budget]] has a null character (no file name can)")
+        raise UsageError(f"{where}: `against` of [[budget]] has a null character (no file name can)")
     try:
         output_names.check_placeholders(entry.get("against", ""), (*output_names.OF_PATHS, SUBFOLDER))
     except UsageError as error:
-        raise UsageError(f"{path}: `against` of [[budget]] is {error}", help=_AGAINST_HELP) from None
-    limits = tuple((name, _limit(path, name, entry[name])) for name in MEASURES if name in entry)
-    return Budget(entry["match"], limits, entry.get("error", ""), entry.get("against", ""))
+        raise UsageError(f"{where}: `against` of [[budget]] is {error}", help=_AGAINST_HELP) from None
+    limits = tuple((name, _limit(where, name, entry[name])) for name in MEASURES if name in entry)
+    text, against = entry.get("error", ""), entry.get("against", "")
+    return Budget(entry["match"], limits, text, against, f"budget {number} of {_from_here(path)}")
 
 
-def _limit(path: Path, name: str, value: float | str) -> float:
-    return float(units.parse_size(value, f"{path}: budget.{name}") if isinstance(value, str) else value)
+def _limit(where: str, name: str, value: float | str) -> float:
+    return float(units.parse_size(value, f"{where}: budget.{name}") if isinstance(value, str) else value)
+
+
+def _from_here(path: Path) -> str:
+    """Path from the current folder, as in an editor's list of files."""
+    try:
+        return Path(os.path.relpath(path)).as_posix()
+    except ValueError:  # on another drive
+        return path.as_posix()
 
 
 def check_rules(config: CheckConfig) -> None:

@@ -72,6 +72,7 @@ class FileChecker:
     _nearest: dict[Path, CheckConfig] = field(default_factory=dict)
     _configs: dict[str, CheckConfig] = field(default_factory=dict)
     _used: set[Budget] = field(default_factory=set)
+    _is_search: bool = False
 
     def check_all(self, inputs: Sequence[str]) -> None:
         """Check files, folders and patterns.
@@ -79,6 +80,7 @@ class FileChecker:
         Sources of budgets that a search finds are not checked themselves, unless they have a budget of their own.
         """
         found = input_files.find(inputs)
+        self._is_search = any(each.is_searched for each in found)
         sources = {source for each in found if (source := self._source_of(each.path))}
         for each in found:
             is_source = each.is_searched and os.path.realpath(each.path) in sources
@@ -115,15 +117,14 @@ class FileChecker:
         except UsageError:
             raise
         except AnimError as error:
-            fault = checked_files.fault_of(path, error)
-            if path != documents.PIPE and not Path(path).exists():
-                fault.help = "name another file"
-            faults = (fault,)
+            faults = (checked_files.fault_of(path, error),)
             self._report_faults(name, faults)
         self.refused += [(name, fault) for fault in faults[:1]]
 
     def warn_of_unused_budgets(self) -> None:
-        """Warn of budgets whose pattern matches no checked file."""
+        """Warn of budgets whose pattern matches no file of a search; a hook names only the files that changed."""
+        if not self._is_search:
+            return
         for config in self._configs.values():
             for budget in config.budgets:
                 if budget not in self._used:
@@ -153,21 +154,21 @@ class FileChecker:
         if budget is None:
             return file, ()
         self._used.add(budget)
-        limited = replace(file, budget=dict(budget.limits))
+        limited = replace(file, budget=dict(budget.limits), budget_place=budget.place)
         if not budget.error:
             return limited, ()
         source_path = str(config.source_of(Path(path), budget))
         try:
             _check_regular(source_path)
             with checked_files.open_checked(source_path) as (_, source):
-                limit = units.parse_length(budget.error, "error", lambda: source.diagonal)
+                limit = units.parse_length(budget.error, f"error in {budget.place}", lambda: source.diagonal)
                 return replace(limited, budget={**limited.budget, ERROR: limit}, source=source), ()
         except UsageError:
             raise
         except AnimError as error:
             fault = checked_files.fault_of(source_path, error)
             fault.where = f"{SOURCE} {PurePath(os.path.relpath(source_path, config.folder)).as_posix()}"
-            fault.help = f"correct `against` of [[budget]] in {Path(config.path).name}"
+            fault.help = f"correct `against` in {budget.place}"
             return limited, (fault,)
 
     def _fix(self, path: str, selection: RuleSelection, *, unsafe: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
@@ -40,10 +41,12 @@ def open_checked(
 
 
 def fault_of(path: str, error: AnimError) -> AnimError:
-    """Return the error of an unreadable file, without the file's name."""
+    """Return the error of an unreadable file, without the file's name; one that isn't there can't be fixed."""
     name = documents.called(path)
     fault = copy(error)
     fault.where = fault.where.removeprefix(name).removeprefix(": ")
+    if path not in ("", documents.PIPE) and not os.path.lexists(path):
+        fault.help = "name another file"
     return fault
 
 

@@ -44,8 +44,11 @@ def read_table(path: str) -> dict[str, Any]:
     return table
 
 
-def check_keys(path: Path, section: str, table: Any, known: Keys) -> None:
-    """Raise UsageError for an unknown key or a value of another type. section: name of the table, "" for all."""
+def check_keys(path: Path | str, section: str, table: Any, known: Keys) -> None:
+    """Raise UsageError for an unknown key or a value of another type.
+
+    path: of the settings, also with the number of the table. section: name of the table, "" for all.
+    """
     if not isinstance(table, dict):
         raise UsageError(f"{path}: [{section}] is no table")
     for key, value in table.items():

@@ -8,10 +8,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from anim.errors import AnimError, NotFoundError, not_written
+from anim.errors import AnimError, not_written
 from anim.units import plural
 from cli import errors
-from cli.errors import RefusedOutputError, UsageError
+from cli.errors import NoFileError, RefusedOutputError, UsageError
 from cli.io import command_files, documents, input_files, output_names
 from cli.text import Reporter
 from cli.typer_options import name_options
@@ -102,7 +102,7 @@ def plan_files(
     pairs: dict[str, FilePair] = {}
     found = [each for each in input_files.find(inputs) if not _is_output(each, pattern)]
     if not found:
-        raise NotFoundError("all files found are outputs", help=f"they are in the folder of '{pattern}'")
+        raise NoFileError("all files found are outputs", help=f"they are in the folder of '{pattern}'")
     for each in found:
         if each.path == documents.PIPE:
             raise UsageError("stdin has no name for --out: name files")

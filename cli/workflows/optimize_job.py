@@ -83,6 +83,11 @@ def optimize_within(
 def _refusal(optimizer: FileOptimizer, max_bytes: int, error: ByteLimitError) -> CheckError:
     """The error for a limit that nothing meets."""
     smallest, max_error = error.smallest, error.max_error
+    if not optimizer.clips:
+        return CheckError(
+            f"doesn't fit {plural(max_bytes, 'byte')}: it takes {plural(smallest.size, 'byte')}, and has no clips that "
+            "could take fewer; nothing was written"
+        )
     share = 100 * max_error / optimizer.scale if optimizer.scale else math.inf
     percent = f" ({format_number(share, 2)} %)" if math.isfinite(share) else ""
     kept = optimize_report.retained_keys(optimizer.document, optimizer.chosen)

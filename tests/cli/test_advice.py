@@ -44,6 +44,21 @@ def follow(call: Call, path: Path) -> set[str]:
     return followed
 
 
+def test_advice_for_a_player_runs(call: Call, tmp_path: Path) -> None:
+    source, output = tmp_path / "in.glb", tmp_path / "out.glb"
+    source.write_bytes(built("interpolations"))
+    options = ("--target", "quick-look", "--select", "GA503", "--format", "json")
+    first, second = call("check", source, *options).json["findings"]
+    assert (first["problem"], second["advice"]) == (
+        "CUBICSPLINE is not supported",
+        "leave it out where the file is made",
+    )
+    line = COMMAND.search(first["advice"])
+    assert line is not None
+    call(line.group(1), source, output, *shlex.split(line.group(2))).product()
+    assert call("check", output, *options).json["findings"] == []
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

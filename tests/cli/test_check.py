@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -36,7 +37,7 @@ def test_folders_and_patterns_are_searched(folder: Path, call: Call) -> None:
 def test_a_pattern_or_folder_without_files_is_an_error(word: str, problem: str, folder: Path, call: Call) -> None:
     (folder / "empty").mkdir()
     run = call("check", word)
-    assert (run.code, run.text) == (5, "")
+    assert (run.code, run.text) == (3, "")  # as for "none.gltf"
     assert problem in run.err
 
 
@@ -45,6 +46,11 @@ def test_the_exit_code_is_6_from_a_severity_on(folder: Path, call: Call) -> None
     run = call("check", "noop.glb", "--fail-on", "info", "-q")
     assert (run.code, run.text) == (6, "")
     assert run.err.startswith("gltf-anim: noop.glb: ")
+    assert run.err.endswith(" more\n")
+    (folder / "again.glb").write_bytes((folder / "noop.glb").read_bytes())
+    many = call("check", "noop.glb", "again.glb", "--fail-on", "info", "-q").err
+    assert re.search(r"; (\d+) findings in 2 files: noop.glb (\d+), again.glb \2$", many.rstrip())
+    assert " findings in 2 files: " in call("inspect", "noop.glb", "again.glb", "--fail-on", "info", "-q").err
 
 
 def test_unreadable_files_exit_3_and_the_others_are_checked(folder: Path, call: Call) -> None:
@@ -120,7 +126,7 @@ def test_a_missing_source_leaves_the_other_findings_and_limits(folder: Path, cal
     assert {"over-budget", "no-effect-tracks"} <= set(found)
     assert found["invalid"]["where"] == "source source/noop.glb"
     assert found["invalid"]["problem"] == "can't be read (no such file or directory)"
-    assert found["invalid"]["advice"] == "correct `against` of [[budget]] in gltf-anim.toml"
+    assert found["invalid"]["advice"] == "correct `against` in budget 1 of gltf-anim.toml"
     assert str(folder) not in run.text
     assert "noop.glb: source source/noop.glb: can't be read" in run.err
 

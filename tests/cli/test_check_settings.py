@@ -167,7 +167,9 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     assert "the budget 'none/**' matches no checked file" in run.err
     found = {(each["file"], each["where"]): each["problem"] for each in run.json["findings"]}
     assert set(found) == {("noop.glb", "clips"), ("coarse.glb", "error")}
-    assert found["noop.glb", "clips"].endswith("above the limit of 3 (300 %)")
+    assert found["noop.glb", "clips"].endswith("above the limit of 3 (300 %) in budget 1 of gltf-anim.toml")
+    assert found["coarse.glb", "error"].endswith(" in budget 2 of gltf-anim.toml")
+    assert "matches no checked file" not in call("check", "noop.glb").err
     table = call("check", "noop.glb", "--budget-report").text
     assert [line.split()[1] for line in table.splitlines()[1:]] == ["bytes", "keys", "clips"]
 

@@ -170,6 +170,13 @@ def test_severities_are_shown_as_fail_on_takes_them(call: Call, fixture: Fixture
     assert call("inspect", path, "--fail-on", *shown).code == 6
 
 
+def test_a_file_that_is_not_there_is_not_to_be_fixed(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(built("arm"))
+    run = call("inspect", tmp_path / "a.glb", tmp_path / "lost.glb")
+    assert run.code == 3
+    assert "can't be read (no such file or directory); name another file\n" in run.text
+
+
 def test_folders_and_patterns_are_inspected(call: Call, tmp_path: Path) -> None:
     (tmp_path / "crowd").mkdir()
     for name in ("b.glb", "a.glb"):
@@ -177,4 +184,4 @@ def test_folders_and_patterns_are_inspected(call: Call, tmp_path: Path) -> None:
     for words in (tmp_path, f"{tmp_path}/**/*.glb"):
         files = call("inspect", words, "--format", "json").json["files"]
         assert [Path(each["file"]).name for each in files] == ["a.glb", "b.glb"]
-    assert call("inspect", f"{tmp_path}/*.gltf").code == 5
+    assert call("inspect", f"{tmp_path}/*.gltf").code == 3

@@ -216,6 +216,10 @@ def test_other_kinds_of_files_are_said_to_be_no_gltf(call: Call) -> None:
     assert "stdin: is no glTF: starts with b'HIER'" in refusal(run, 3)
     assert help_line(run) == "gltf-anim from-euler makes glTF of BVH"
     assert "is no glTF" in refusal(call("inspect", stdin=b"HIERARCHY\nROOT"), 3)
+    for head in (b"PK\x03\x04", b"POINTCACHE2\0", b"PXR-USDC", b"#usda 1.0"):
+        run = call("inspect", stdin=head + bytes(30))
+        assert "is no glTF" in refusal(run, 3)
+        assert help_line(run).startswith("if it is a vertex cache: view and render show it, convert-cache makes .glb")
 
 
 def test_a_pointer_of_git_lfs_says_how_to_get_the_file(call: Call) -> None:

@@ -35,6 +35,7 @@ def test_the_smallest_error_that_fits(fixture: Fixture, tmp_path: Path, call: Ca
     run = call("optimize", source, tmp_path / "fits.glb", "--max-bytes", f"{limit / 1000}kB", "--report", "-", *FAST)
     assert run.code == 0, run.err
     assert (tmp_path / "fits.glb").stat().st_size <= limit
+    assert "the smallest error found that fits --max-bytes" in run.err
     error = max(each["max_error_m"] for each in run.json["clips"])
     assert 0 < error <= 0.011 * run.json["diagonal_m"]
     roomy = call("optimize", source, tmp_path / "r.glb", "--max-bytes", str(found["0"] + 100), "--report", "-", *FAST)

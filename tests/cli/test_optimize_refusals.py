@@ -74,8 +74,12 @@ def test_a_file_without_clips(tmp_path: Path, call: Call) -> None:
     bare = replace(document, json={key: value for key, value in document.json.items() if key != "animations"})
     source, output = tmp_path / "bare.glb", tmp_path / "out.glb"
     source.write_bytes(glb_of(bare))
-    assert call("optimize", source, output).code == 0
+    for options in ((), ("--max-bytes", "1MB")):
+        run = call("optimize", source, output, *options)
+        assert (run.code, run.err.rstrip().endswith(", unchanged: it has no clips")) == (0, True), run.err
     assert output.read_bytes() == source.read_bytes()
+    said = refusal(call("optimize", source, output, "--max-bytes", "1kB"), 6)
+    assert said.endswith("and has no clips that could take fewer; nothing was written")
 
 
 @needs_validator

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call, Fixture
-from tests.cli.running import built
+from tests.cli.running import built, refusal
 from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, write_recipe
 
 PLAIN = ("resample --fps 12",)
@@ -260,3 +260,16 @@ def test_a_file_is_listed_with_the_error_of_each_step(folder: Path, call: Call) 
     (folder / "build/crowd/hero.glb").unlink()
     assert f" %), {expected} (cached)" in call("run", "-v").err
     assert f" %), {expected} (cached)" in call("run", "-v").err  # the output is there already
+
+
+def test_without_a_cache_its_folder_need_not_be_writable(folder: Path, call: Call) -> None:
+    """The journal serves --resume and --delete-stale alone."""
+    write_recipe(folder, *PLAIN)
+    (folder / ".gltf-anim-cache").write_text("in the way")
+    assert "can't be written" in call("run").err
+    run = call("run", "--no-cache")
+    assert (run.code, "1 file: 1 made" in run.err) == (0, True), run.err
+    assert run.err.startswith("note: --resume and --delete-stale will not know of this run: ")
+    assert [path.name for path in (folder / "build").rglob("*.glb")] == ["arm 1.glb"]
+    for option in ("--resume", "--delete-stale"):
+        assert "can't be written" in refusal(call("run", "--no-cache", option), 3)

@@ -12,24 +12,33 @@ from anim.check.edits import edit_tracks
 from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document
+from anim.measure.inspect.report import ClipReport
 from anim.model import Track
 
 UNITY = "unity"
 LATE_TRACKS = "late tracks"
 ADD_KEYS = "to add keys at 0 s: gltf-anim check FILE --fix --select GA105 --target unity"
+REBASE = "if unintended, so that it loops without a pause: gltf-anim trim IN OUT --rebase"
 MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display shows them
+MAX_LOOP_GAP = 0.001  # of the model's size; GA107 finds larger ones
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips; for Unity also those with only some late tracks."""
     for report, clip in file.clips:
         if report.start_s > MIN_LATE_START_S:
-            yield file.in_clip(report.index, value=report.start_s, time_s=report.start_s)
+            found = file.in_clip(report.index, value=report.start_s, time_s=report.start_s)
+            yield replace(found, advice=REBASE, is_fixable=False) if _loops(file, report) else found
         elif parameters.target == UNITY:
             late = [float(track.times[0]) for track in clip.tracks if track.times[0] > MIN_LATE_START_S]
             if late:
                 found = file.in_clip(report.index, len(late), max(late), problem=LATE_TRACKS, time_s=max(late))
                 yield replace(found, advice=ADD_KEYS)
+
+
+def _loops(file: CheckedFile, report: ClipReport) -> bool:
+    """Return whether a clip loops from its first key, but for a frame: a pause before that key would be part of it."""
+    return report.index in file.missing_frames or report.seam_m <= MAX_LOOP_GAP * file.diagonal
 
 
 def problem(found: Sequence[Occurrence]) -> str:
@@ -45,7 +54,10 @@ def problem(found: Sequence[Occurrence]) -> str:
 
 
 def fix(file: CheckedFile, found: Sequence[Occurrence], parameters: Parameters) -> Document:
-    """Return the document with a key at 0 s in every late track, with the value of its first key."""
+    """Return the document with a key at 0 s in every late track, with the value of its first key.
+
+    Clips that loop from their first key stay: the motion is the same, but the pause would become part of the loop.
+    """
     return edit_tracks(file, found, _hold)
 
 
@@ -71,5 +83,5 @@ RULE = Rule(
     problem,
     "if unintended: gltf-anim trim IN OUT --rebase",
     targets={"unity": Severity.WARNING},
-    fix=Fix("add a key at 0 s with the first value, which players show until then", fix, is_safe=True),
+    fix=Fix("add a key at 0 s with the first value, which players show until then, unless it loops", fix, is_safe=True),
 )

@@ -16,7 +16,8 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         if value > limit:
             unit = " m" if name == ERROR else ""
             share = f" ({100 * value / limit:.0f} %)" if limit else ""
-            problem = f"{value:.6g}{unit}, above the limit of {limit:.6g}{unit}{share}"
+            place = f" in {file.budget_place}" if file.budget_place else ""
+            problem = f"{value:.6g}{unit}, above the limit of {limit:.6g}{unit}{share}{place}"
             yield Occurrence(name, "", value=value, problem=problem, name=name)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
+from anim.check.advice import clip_advice
 from anim.check.budget import MEASURES
 from anim.check.checked_file import CheckedFile
 from anim.check.finding import Occurrence, Severity
@@ -11,6 +13,11 @@ from anim.check.players import PLAYERS, Player
 from anim.check.rule import Parameters, Rule
 from anim.gltf.document import json_array
 from anim.model import Interpolation
+
+LEAVE_OUT = "leave it out where the file is made"
+TO_LINEAR = "gltf-anim resample IN OUT --fps {finer} --interpolation linear{clips}"
+AS_LINEAR = f"to write LINEAR keys: {TO_LINEAR}"
+AS_LINEAR_WITH_STEPS = f"to write LINEAR keys, and ramps of a frame for the STEP tracks: {TO_LINEAR}"
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -20,15 +27,19 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
         yield from _interpolations(file, player)
         yield from _counts(file, player)
         for name in sorted(player.extensions & set(file.json.get("extensionsUsed", ()))):
-            yield Occurrence("extensionsUsed", "/extensionsUsed", problem=f"{name} is not supported", name=name)
+            problem, advice = f"{name} is not supported", "write the file without it where it is made"
+            yield Occurrence("extensionsUsed", "/extensionsUsed", problem=problem, advice=advice, name=name)
 
 
 def _interpolations(file: CheckedFile, player: Player) -> Iterator[Occurrence]:
-    problems = {Interpolation.CUBICSPLINE: player.cubic, Interpolation.STEP: player.step}
     for report, clip in file.clips:
-        for interpolation, problem in problems.items():
-            if problem and any(track.interpolation is interpolation for track in clip.tracks):
-                yield file.in_clip(report.index, problem=problem)
+        used = {track.interpolation for track in clip.tracks}
+        if player.cubic and Interpolation.CUBICSPLINE in used:
+            advice = AS_LINEAR_WITH_STEPS if Interpolation.STEP in used else AS_LINEAR
+            found = file.in_clip(report.index, problem=player.cubic)
+            yield replace(found, advice=clip_advice(advice, file.facts.clips, [report.index]))
+        if player.step and Interpolation.STEP in used:
+            yield file.in_clip(report.index, problem=player.step)
         if player.pointer and any(track.pointer is not None for track in clip.tracks):
             yield file.in_clip(report.index, problem=player.pointer)
 
@@ -64,7 +75,7 @@ RULE = Rule(
     "From the sources of the players: glTFast writes CUBICSPLINE with wrong tangents, Scene Viewer plays the first "
     "clip only, Quick Look shows no morph targets.",
     find,
-    advice="leave it out where the file is made; `resample --interpolation linear` writes CUBICSPLINE as LINEAR keys",
+    advice=LEAVE_OUT,
     is_default=False,
     targets=dict.fromkeys(PLAYERS, Severity.WARNING),
 )

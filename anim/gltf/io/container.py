@@ -21,7 +21,11 @@ MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
 BIN_CHUNK = 0x004E4942
 MAX_GLB_BYTES = 2**32 - 1  # bytes; the header's length field has 32 bits
-BVH_HEADER = b"HIERARCHY"
+_CACHE_HELP = "if it is a vertex cache: view and render show it, convert-cache makes .glb of it, diff compares it"
+OTHER_FORMATS = {  # first bytes, and the commands that read them
+    b"HIERARCHY": "gltf-anim from-euler makes glTF of BVH",
+    **dict.fromkeys((b"PK", b"POINTCACHE2", b"PXR-USDC", b"#USDA"), _CACHE_HELP),  # PK: .npz and .usdz
+}
 LFS_POINTER = b"version https://git-lfs"
 
 Choose: TypeAlias = Callable[[int, str, Bytes], str]
@@ -55,10 +59,10 @@ def read(data: Bytes | bytes | bytearray | memoryview, resolve: Resolve | None =
         raise FormatError("is empty (expected glTF)")
     json_text.check_mark(head)
     if head.lstrip()[:1] != b"{":
-        is_bvh = head.lstrip()[: len(BVH_HEADER)].upper() == BVH_HEADER
+        start = head.lstrip()[:16].upper()
         raise FormatError(
             f"is no glTF: starts with {head[:4]!r} (expected b'glTF' or a JSON object)",
-            help="gltf-anim from-euler makes glTF of BVH" if is_bvh else "",
+            help=next((help for begin, help in OTHER_FORMATS.items() if start.startswith(begin)), ""),
         )
     raw = content.tobytes()
     parsed, expanded = _parse(raw)

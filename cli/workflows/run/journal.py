@@ -53,11 +53,12 @@ Entries: TypeAlias = Mapping[tuple[str, str], JournalEntry]  # the last ones, by
 class Journal:
     """Journal that a run writes; a line is complete in the file as soon as it is written.
 
-    settings: name of the settings file. earlier: entries of the run that is resumed.
+    file: None of a run that keeps no journal. settings: name of the settings file. earlier: entries of the run that is
+    resumed.
     """
 
     path: Path
-    file: io.FileIO
+    file: io.FileIO | None
     settings: str
     earlier: Entries
 
@@ -67,6 +68,8 @@ class Journal:
 
     def write_line(self, value: dict[str, Any]) -> None:
         """Append a JSON object as a line. Raises OutputError."""
+        if self.file is None:
+            return
         line = json.dumps(value, ensure_ascii=False) + "\n"
         write_stream(self.file, [line.encode(errors="backslashreplace")], str(self.path))
 

@@ -6,10 +6,9 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
-from anim.errors import NotFoundError
 from anim.files.special_files import is_device_or_pipe
 from anim.gltf.io import container
-from cli.errors import UsageError
+from cli.errors import NoFileError, UsageError
 from cli.io import input_files
 from cli.io.path_patterns import can_match_below, matches
 from cli.workflows.run import places
@@ -29,7 +28,7 @@ def plan_jobs(
     earlier: outputs of earlier runs, which are not found as inputs of the recipes that made them.
     named: whether the recipes are named by the command line: then files need not match.
     Outputs are never inputs: "*.glb" would match those beside their inputs. Raises UsageError for two files with one
-    output, NotFoundError without any file, and FormatError for a folder that can't be read and may have matching files:
+    output, NoFileError without any file, and FormatError for a folder that can't be read and may have matching files:
     their outputs are no stale ones.
     """
     given = [_relative(book, each) for each in input_files.expand(files)]
@@ -83,7 +82,7 @@ def _check(book: RecipeBook, jobs: Sequence[Job], given: Sequence[str]) -> None:
         if path not in used:
             raise UsageError(f"{path}: matches no recipe of {book.path}", help="--recipe NAME chooses one for any file")
     if not jobs:
-        raise NotFoundError(f"{book.path}: no recipe matches a file")
+        raise NoFileError(f"{book.path}: no recipe matches a file")
     if problem := next(places.find_clashes(jobs), ""):
         raise UsageError(f"{book.path}: {problem}", help="out names other files, in the folder of the settings")
     places.check_regular(book.folder, used | {name for job in jobs for step in job.steps for name in step.files})

@@ -167,6 +167,21 @@ def test_unity_needs_keys_at_0_in_every_track() -> None:
     assert found_in_unity(fixed.document, "GA105") == []
 
 
+def test_a_late_clip_that_loops_keeps_its_start() -> None:
+    """With a key at 0 s the pause before the first key would be part of the loop, and no end frame would close it."""
+    late = np.arange(1, 14) / 12
+    for end in (13, 12):  # closed; open by one frame
+        looped = with_tracks(track("translation", late[:end], SMOOTH[:end], node=1))
+        (finding,) = found(looped, "GA105")
+        assert finding.advice.endswith("gltf-anim trim IN OUT --rebase")
+        assert finding.fixable == ""
+        assert found(looped, "GA108") == [] or end == 12
+        result = fix_all(checked(looped), RuleSelection(select=("GA105", "GA107", "GA108")), unsafe=True)
+        assert [each.rule.code for each in result.applied] == (["GA108"] if end == 12 else [])
+        fixed = reader.clips(result.document)[0]
+        assert (fixed.start, fixed.end) == pytest.approx((1 / 12, 13 / 12))
+
+
 def test_unity_finds_nodes_by_their_path() -> None:
     moves = [[0, 0, 0], [0, 1, 0]]
     chain = with_tracks(*(track("translation", [0, 1], moves, node=node) for node in ARM_JOINTS[:2]))
