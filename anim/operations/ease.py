@@ -71,7 +71,7 @@ def ease(
     start, end = check_number(start, "start"), check_number(end, "end")
     if not end > start:
         raise RangeError(f"the range from {start:g} s to {end:g} s is empty")
-    job = _Job(easing, start, end, tolerances, interpolation)
+    job = _Job(easing, start, end, tolerances, interpolation, easing.extent)
     made: dict[object, tuple[Track, Track]] = {}  # many tracks are equal but for their node, as constant scales
     new = list(clip.tracks)
     for i in sorted(chosen):
@@ -115,6 +115,7 @@ class _Job:
     end: float
     tolerances: Tolerances
     interpolation: str
+    extent: tuple[float, float]
 
     def eased(self, track: Track) -> Track:
         inside = (track.times[:-1] >= self.start - EDGE_TOLERANCE_S) & (track.times[1:] <= self.end + EDGE_TOLERANCE_S)
@@ -172,8 +173,8 @@ class _Job:
         )
 
     def _allowed(self, track: Track, inside: Bools) -> tuple[float, float]:
-        """Tolerance of the keys, and greatest derivative per u, which multiplies an easing's error."""
-        speed = segment.max_rate(track, np.flatnonzero(inside))
+        """Tolerance of the keys, and greatest derivative per u of the easing's extent, which multiplies its error."""
+        speed = segment.max_rate(track, np.flatnonzero(inside), extent=self.extent)
         if track.kind is ValueKind.ROTATION:
             return self.tolerances.angle, speed
         ranges = np.abs(np.diff(track.values, axis=0)).max(axis=1)[inside]

@@ -22,6 +22,7 @@ from anim.sampling.track import sample
 DURATION_TOLERANCE_FRACTION = 1e-6  # of the last key's time, of a blend as long as the clip: float32 and %g round
 MIN_BLEND_KEYS = 6  # fewest keys in a blend; sparser tracks get more
 BLEND_FPS = 30.0  # of the added keys
+MIN_SHARE = 1e-9  # of a blend before its last segment; less is rounding
 MIN_INTERVAL_S = 1e-5  # s, between two keys; more where float32 resolves less
 
 
@@ -63,9 +64,9 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, fram
     """Return the clip with its last `blend` seconds corrected to end as it starts, in value and speed.
 
     The correction is added to the motion: a cubic from 0 to the loop gap in value and speed; for rotations a rotation
-    vector. The last segment of a LINEAR track gets the speed of the first one. STEP tracks have their first value at
-    the end of the clip. Tracks not in `tracks` keep their end, for example of a traveling root. frame_rate: of the keys
-    added in the blend, from its start; None for even spacing.
+    vector. The last segment of a LINEAR track gets the speed of the first one, which stays. STEP tracks have their
+    first value at the end of the clip. Tracks not in `tracks` keep their end, for example of a traveling root.
+    frame_rate: of the keys added in the blend, from its start; None for even spacing.
     Raises RangeError unless 0 < blend ≤ the clip's duration, which is that of float32 keys: 1.3 s is 1.29999995 s.
     """
     chosen = track_indices(clip, tracks)
@@ -76,7 +77,7 @@ def loop(clip: Clip, *, blend: float, tracks: frozenset[int] | None = None, fram
     blend = min(blend, duration)
     if frame_rate is not None:
         frame_rate = check_fps(frame_rate)
-    at_end = _Blend(clip.start, clip.end - blend, clip.end, blend, frame_rate)
+    at_end = _Blend(clip.start, clip.end - blend, clip.end, frame_rate)
     return change_tracks(clip, chosen, lambda tracks: _close(tracks, at_end))
 
 
@@ -107,13 +108,12 @@ def _continue_travel(track: Track, clip: Clip, end: float) -> Floats:
 class _Blend(NamedTuple):
     """The part of a clip that is corrected: times of the clip's first key, of its own start and end, in s.
 
-    seconds: its duration. frame_rate: of added keys.
+    frame_rate: of added keys.
     """
 
     first: float
     start: float
     end: float
-    seconds: float
     frame_rate: float | None
 
 
@@ -150,8 +150,15 @@ def _correct(
         return _correct_spline(tracks, times, _Correction(blend.start, blend.end, gap, change))
     values, last_piece = sample(tracks, times), float(times[-1] - times[-2])
     before_last = _closing_offset(tracks, _extrapolate(tracks, first, speed, -last_piece), values[-2])
-    correction = _Correction(blend.start, blend.end, gap, _end_slope(gap, before_last, blend.seconds, last_piece))
+    start = _correction_start(times, blend)
+    correction = _Correction(start, blend.end, gap, _end_slope(gap, before_last, blend.end - start, last_piece))
     return tracks.with_keys(times, _add_correction(tracks, values, correction.value(times))).split()
+
+
+def _correction_start(times: Floats, blend: _Blend) -> float:
+    """Return the blend's start, after the first segment of keys (K,): the last one gets the speed which that has."""
+    second = int(np.searchsorted(times, blend.first + MIN_INTERVAL_S, side="right"))
+    return max(blend.start, float(times[min(second, len(times) - 2)]))
 
 
 def _close_steps(tracks: StackedTracks, end: float, first: Floats) -> list[Track]:
@@ -193,6 +200,8 @@ def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -
     The cubic is 0 with slope 0 at first, `gap` after `duration` seconds, and `before_last` at `last` seconds earlier.
     """
     share = 1 - last / duration
+    if share < MIN_SHARE:  # no key between, so no speed of the last segment but that of its ends
+        return np.zeros_like(gap)
     # c(s) = (3 g − m) s² + (m − 2 g) s³ with m the slope per duration, so that c(1) = g and c'(1) = m
     return (gap * (3 * share**2 - 2 * share**3) - before_last) / (share**2 * (1 - share)) / duration
 

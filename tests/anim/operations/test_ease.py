@@ -133,6 +133,24 @@ def test_spline_sources_keep_their_path() -> None:
         np.testing.assert_allclose(sample(new, KEYS[k] + span * u), true, atol=2e-3)
 
 
+@pytest.mark.parametrize("path", ["translation", "rotation"])
+def test_spline_sources_keep_to_the_tolerance_beyond_their_keys(path: str) -> None:
+    """Extrapolated by a spring, they are faster than between keys; a quaternion's components come near to 0 there."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    values = VALUES[:2] if path == "translation" else np.array([[0.9, 0, 0.1, 0.42], [-0.2, 0.3, 0.1, 0.9]])
+    slopes = np.array([[1.0, 0, 3, 0], [-2, 0.5, 7, -1]])[:, : values.shape[1]]
+    spline = CubicHermiteSpline([0, 1], values, slopes, extrapolate=True)
+    source = Track(0, path, CUBICSPLINE, np.array([0.0, 1]), values, slopes, slopes)
+    new = eased(source, "spring(100, 2)", interpolation="linear")
+    times = (np.arange(20000) + 0.5) / 20000
+    got, true = sample(new, times), spline(parse("spring(100, 2)").value(times))
+    if path == "rotation":
+        assert quaternion.angle_between(got, quaternion.normalize(true)).max() <= ANGLE
+    else:
+        assert np.abs(got - true).max() <= 1e-3 * np.abs(values[1] - values[0]).max()
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_steps_become_step(count: int) -> None:
     new = eased(MOVE, f"steps({count})")

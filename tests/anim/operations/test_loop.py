@@ -88,7 +88,7 @@ def test_ends_meet_in_value_and_splines_in_speed(key: str) -> None:
 
 
 @pytest.mark.parametrize("count", [2, 9, 40])
-@pytest.mark.parametrize("blend", [0.3, 1.0])
+@pytest.mark.parametrize("blend", [0.3, 1.0, 1.999995, 2.0])
 def test_linear_tracks_end_at_the_speed_that_they_start_with(count: int, blend: float) -> None:
     """However few keys, or however many: the last piece goes on as the first one does."""
     times = np.linspace(0, 2, count)
@@ -99,12 +99,26 @@ def test_linear_tracks_end_at_the_speed_that_they_start_with(count: int, blend: 
         np.testing.assert_allclose(end, start, atol=1e-6)
 
 
+def test_a_blend_over_a_whole_clip_leaves_its_first_segment() -> None:
+    times = np.array([0.0, 0.01, 0.04, 0.1])
+    rise = track("translation", times, np.stack((times, 3 * times, 0 * times), axis=1), LINEAR)
+    (new,) = loop(Clip("", (rise,)), blend=0.1).tracks
+    before = np.linspace(0, new.times[1], 9)
+    np.testing.assert_allclose(sample(new, before), sample(rise, before), atol=1e-12)
+
+
+def test_a_clip_too_short_for_a_key_in_the_blend_is_closed() -> None:
+    short = track("translation", [0, 1.5e-5], np.array([[0.0, 0, 0], [1, 2, 3]]), LINEAR)
+    (new,) = loop(Clip("", (short,)), blend=1.5e-5).tracks
+    np.testing.assert_array_equal(new.values, 0)
+
+
 def test_a_track_that_starts_late_rests_at_the_seam() -> None:
     late = track("translation", [0.5, 1.5], np.array([[3.0, 0, 0], [5, 0, 0]]), LINEAR, node=0)
     other = track("translation", [0, 2], np.zeros((2, 3)), LINEAR, node=1)
     new = loop(Clip("", (late, other)), blend=0.3).tracks[0]
     np.testing.assert_allclose(rates(new, np.array([2.0]), before=True), 0, atol=1e-9)
-    assert np.diff(sample(new, np.linspace(1.7, 2, 100))[:, 0]).max() <= 0
+    assert np.diff(sample(new, np.linspace(1.7, 2, 100))[:, 0]).max() < 1e-12
 
 
 def test_keys_that_jump_before_the_blend_stay() -> None:
