@@ -76,8 +76,9 @@ def command(
     joints that are open, and "root motion" is the distance between both ends of the path of the root.
 
     With OUT, a clip that is open by one frame gets the missing frame, in which root motion continues. --blend closes
-    any gap of value and velocity; if only some joints are open, it changes only these. --find lists the time ranges
-    that loop best, for trim, and names the clips in which no range loops better than the whole clip.
+    any gap of value and velocity but those of the path of a root that travels, which stays as it is, its height too;
+    if only some joints are open, it changes only these. --find lists the time ranges that loop best, for trim, and
+    names the clips in which no range loops better than the whole clip.
     """
     selection = Selection(clip or ())
     reporter = Reporter(quiet, verbose)
