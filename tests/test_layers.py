@@ -90,7 +90,7 @@ PUBLIC = {
         "buffers container file_references gltf_files images json_text lenient source text_form unused_buffers uri"
     ),
     "gltf.meshopt": "codec storage",
-    "gltf.reading": "accessors materials meshes reader scene_nodes vertex_colors",
+    "gltf.reading": "accessors materials meshes node_constraints reader scene_nodes vertex_colors",
     "gltf.validation": "animation_storage buffer_layout channel_targets extensions hierarchy rules schema",
     "gltf.writing": "append byte_ranges draco_decoding new_accessors references reindex removal unknown_extensions "
     "writer",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from anim.errors import AnimError
 from anim.gltf.document import Document
 from anim.gltf.reading import reader
+from anim.gltf.reading.node_constraints import constraint_sources
 from anim.measure.equal_clips import first_equal
 from anim.measure.error.sample_times import FPS
 from anim.measure.error.surface import has_vertices
@@ -129,7 +130,7 @@ def _prepare(
     document: Document, scene: Scene, clips: Sequence[Clip], request: Request, *, detailed: bool, verified: bool
 ) -> tuple[RebasedDocument | None, ClipOptimizer]:
     """The document and scene with another rest pose, if it may change, and the optimizer of all clips."""
-    request = _visible_clips(request, scene)
+    request = _with_constraint_sources(document, _visible_clips(request, scene))
     base = rebase(document, scene, clips, exact=request.bounds.max_error == 0) if request.policy.rebase_rest else None
     after = base.scene if base else scene
     return base, ClipOptimizer(request, scene, after, tuple(clips), detailed=detailed, verified=verified)
@@ -182,6 +183,14 @@ def _visible_clips(request: Request, scene: Scene) -> Request:
     if has_vertices(scene):
         return request
     return replace(request, policy=replace(request.policy, drop_invisible=False))
+
+
+def _with_constraint_sources(document: Document, request: Request) -> Request:
+    """The request; invisible nodes stay if players rotate others by them, since no error of that is measured."""
+    policy = request.policy
+    if not policy.drop_invisible:
+        return request
+    return replace(request, policy=replace(policy, keep=policy.keep | constraint_sources(document.json)))
 
 
 def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, Task]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from anim.arrays import Floats
 from anim.gltf.document import Document, Json, json_array
+from anim.gltf.reading.node_constraints import rest_pose_extensions
 from anim.model import Clip, Scene, Skeleton
 from anim.optimization.search.source_motion import PATHS
 
@@ -31,8 +32,11 @@ def rebase(document: Document, scene: Scene, clips: Sequence[Clip], *, exact: bo
     """Return the scene with the most common constant of each property as its rest value.
 
     Only properties that every clip animates change; the rest value of others is visible in some clip. Values are the
-    shortest decimals that are equal in float32; exact: in float64 too.
+    shortest decimals that are equal in float32; exact: in float64 too. Nothing changes in a file with one of the
+    `rest_pose_extensions`.
     """
+    if rest_pose_extensions(document.json):
+        return RebasedDocument(document, scene, ())
     skeleton = scene.skeleton
     values = _most_common_value(skeleton, clips)
     nodes = json_array(document.json, "nodes")

@@ -212,6 +212,8 @@ def command(
                 reporter=reporter,
             )
             wanted = request(optimizer.scene)
+            if rebase_rest:
+                optimize_job.note_rest_pose(optimizer.document, source.name, reporter)
             if curve_file is not None:
                 write_curve(optimizer, wanted, curve_file, source.name, reporter, dry_run=dry_run)
                 return

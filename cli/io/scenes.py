@@ -8,6 +8,7 @@ from anim.errors import AnimError
 from anim.gltf.document import Document, node_label
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.node_constraints import CONSTRAINT, constrained_nodes
 from anim.gltf.reading.scene_nodes import INSTANCING, instanced_nodes, mesh_nodes_of_other_scenes
 from anim.gltf.validation.channel_targets import has_weight_pointers
 from anim.model import Scene, Skeleton
@@ -29,7 +30,7 @@ def read_scene(
     repeats: bool = True,
     nodes: Callable[[Scene], Collection[int] | None] = lambda _: None,
 ) -> Scene:
-    """Return the scene of a document; warn of normalized skin weights, ignored mesh copies and pointers without effect.
+    """Return the scene of a document; warn of normalized skin weights, ignored mesh copies, constraints and pointers.
 
     name: of the file, for messages. accessors, skeleton: the document's, if the caller has them.
     normals, tangents, repeats: as for `reader.scene`. nodes: gives the nodes of the command's meshes; None for all.
@@ -59,6 +60,7 @@ def warn_of_scene(
         for words in bad.in_words():
             reporter.warn(f"{name}: {words}")
     _warn_of_copies(document, name, reporter, chosen)
+    _warn_of_constraints(document, name, reporter)
     _warn_of_weight_pointers(document, found.skeleton, name, reporter, accessors)
 
 
@@ -82,6 +84,16 @@ def _warn_of_copies(document: Document, name: str, reporter: Reporter, chosen: C
         reporter.warn(
             f"{name}: {node_label(document.json, copied[0])}{words} copies of a mesh by {INSTANCING}: "
             "one copy per node counts here, and others may move farther than is said"
+        )
+
+
+def _warn_of_constraints(document: Document, name: str, reporter: Reporter) -> None:
+    constrained = constrained_nodes(document.json)
+    if constrained:
+        words = f" and {len(constrained) - 1} more have" if len(constrained) > 1 else " has"
+        reporter.warn(
+            f"{name}: {node_label(document.json, constrained[0])}{words} a constraint by {CONSTRAINT}, which is not "
+            "evaluated: players rotate such nodes, and what is below them, otherwise"
         )
 
 

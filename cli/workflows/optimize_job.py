@@ -9,9 +9,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from anim.files import signals
+from anim.gltf.document import Document
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
+from anim.gltf.reading.node_constraints import rest_pose_extensions
 from anim.measure.error.surface import diagonal, reference_length
 from anim.model import Scene
 from anim.operations.selection import Selection
@@ -62,6 +64,12 @@ def make_optimizer(
         detailed=detailed,
         progress=show_progress,
     )
+
+
+def note_rest_pose(document: Document, name: str, reporter: Reporter) -> None:
+    """Say why the rest pose stays, if extensions depend on it."""
+    if found := rest_pose_extensions(document.json):
+        reporter.info(f"note: {name}: the rest pose stays, since {found[0]} depends on it")
 
 
 def optimize_within(

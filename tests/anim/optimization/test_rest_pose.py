@@ -39,6 +39,12 @@ def test_what_one_clip_leaves_alone_stays() -> None:
     assert found.scene is OF
 
 
+@pytest.mark.parametrize("name", ["VRM", "VRMC_vrm", "VRMC_springBone", "VRMC_node_constraint"])
+def test_a_rest_pose_that_extensions_use_stays(name: str) -> None:
+    document = Document({**DOCUMENT.json, "extensionsUsed": [name]}, ())
+    assert _rebased((CONSTANT,), (MOVING,), (CONSTANT, OTHER), document=document).moved == ()
+
+
 def test_nothing_moves_in_any_clip() -> None:
     clips = [clip(CONSTANT, OTHER), clip(MOVING), clip(CONSTANT)]
     found = rebase(DOCUMENT, OF, clips)

@@ -1,0 +1,47 @@
+"""Nodes that players rotate after a clip by VRMC_node_constraint, and extensions that use the rest pose.
+
+Constraints are not evaluated here. Source: VRMC_node_constraint 1.0, whose rotations are relative to the rest pose.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from anim.gltf.document import Json, json_array
+from anim.gltf.validation import hierarchy
+from anim.model.skeleton import ancestors
+
+CONSTRAINT = "VRMC_node_constraint"
+# A humanoid's clips, spring bones and constraints are relative to the rotations of the nodes at rest.
+REST_POSE_EXTENSIONS = frozenset({"VRM", "VRMC_vrm", "VRMC_springBone", CONSTRAINT})
+
+
+def constrained_nodes(json: Json) -> list[int]:
+    """Return the indices of the nodes with a constraint."""
+    return [i for i, node in enumerate(json_array(json, "nodes")) if CONSTRAINT in (node.get("extensions") or {})]
+
+
+def constraint_sources(json: Json) -> frozenset[int]:
+    """Return the nodes that move the constrained ones: sources, and those above the sources of aim constraints."""
+    nodes, found = json_array(json, "nodes"), set[int]()
+    constrained = constrained_nodes(json)
+    parents = hierarchy.parents(json) if constrained else []
+    for node in constrained:
+        for kind, source in _sources(nodes[node]["extensions"][CONSTRAINT]):
+            if 0 <= source < len(nodes):
+                found.add(source)
+                found.update(each for each in ancestors(parents, source) if kind == "aim")
+    return frozenset(found)
+
+
+def rest_pose_extensions(json: Json) -> list[str]:
+    """Return the names of the extensions of a file that are relative to its rest pose."""
+    return [name for name in json.get("extensionsUsed", ()) if name in REST_POSE_EXTENSIONS]
+
+
+def _sources(extension: Any) -> list[tuple[str, int]]:
+    """Kinds and sources of a constraint; its values are of any type, since nothing has checked them."""
+    constraint = extension.get("constraint") if isinstance(extension, dict) else None
+    kinds = constraint.items() if isinstance(constraint, dict) else ()
+    found = [(kind, each.get("source")) for kind, each in kinds if isinstance(each, dict)]
+    return [(kind, source) for kind, source in found if type(source) is int]
