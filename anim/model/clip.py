@@ -31,6 +31,8 @@ class Clip:
             raise ShapeError(f"name is {self.name!r} (expected text, empty for none)")
         if not isinstance(self.tracks, tuple):
             object.__setattr__(self, "tracks", _as_tuple(self.tracks))
+        if not self.tracks:  # of tens of thousands, in some files
+            return
         if strange := [each for each in self.tracks if not isinstance(each, Track)]:
             raise ShapeError(f"tracks hold {type(strange[0]).__name__} (expected Track)")
         targets = [(track.node, track.path) for track in self.tracks if track.node is not None]
@@ -53,12 +55,12 @@ class Clip:
     @property
     def start(self) -> float:
         """Time of the first key, in seconds; 0 without tracks."""
-        return min((float(axis.times[0]) for axis in self.time_axes), default=0.0)
+        return min([float(axis.times[0]) for axis in self.time_axes]) if self.tracks else 0.0
 
     @property
     def end(self) -> float:
         """Time of the last key, in seconds: the animation's duration in glTF, where it always starts at 0."""
-        return max((float(axis.times[-1]) for axis in self.time_axes), default=0.0)
+        return max([float(axis.times[-1]) for axis in self.time_axes]) if self.tracks else 0.0
 
     @property
     def num_bytes(self) -> int:
