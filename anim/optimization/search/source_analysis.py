@@ -29,6 +29,8 @@ from anim.optimization.tracks.clip_ends import closure_signs
 from anim.sampling.clips import sample_transforms
 from anim.sampling.players import sampler
 
+BLOCK_KEYS = 1 << 19  # whose places on a grid are looked up at a time, in 20 MB
+
 
 class FreeTracks(NamedTuple):
     """A clip to analyze: only the tracks with indices in `free` may change.
@@ -173,12 +175,13 @@ def source_keys(tracks: Sequence[Track], grid: Floats, *, is_part: bool) -> Bool
     found = np.zeros((len(tracks), len(grid)), np.bool_)
     for i, track in enumerate(tracks):
         found[i] = track.interpolation is Interpolation.CUBICSPLINE
-    counts = [len(track.times) for track in tracks]
-    if counts:
-        keys = np.concatenate([track.times for track in tracks]).astype(np.float32).astype(np.float64)
+    counts = np.array([len(track.times) for track in tracks], np.int64)
+    blocks = np.cumsum(counts) // BLOCK_KEYS
+    for some in np.split(np.arange(len(tracks)), np.flatnonzero(np.diff(blocks)) + 1) if len(tracks) else ():
+        keys = np.concatenate([tracks[i].times for i in some.tolist()]).astype(np.float32).astype(np.float64)
         at = np.minimum(np.searchsorted(grid, keys), len(grid) - 1)
         on_grid = grid[at] == keys
-        found[np.repeat(np.arange(len(tracks)), counts)[on_grid], at[on_grid]] = True
+        found[np.repeat(some, counts[some])[on_grid], at[on_grid]] = True
     if is_part:
         found[:, [0, -1]] = True
     return found
