@@ -43,7 +43,7 @@ class Parameters(dict[str, float]):
 
 
 class Fix(NamedTuple):
-    """Change of a document after which the rule finds nothing.
+    """Change of a document after which the rule finds nothing that is fixable.
 
     is_safe: no vertex moves by more than 1e-6 of the model's diagonal, which `fixing` measures on the written bytes.
     apply: returns the same document if nothing can be fixed. yields_to: codes of rules whose fixes it would undo; it

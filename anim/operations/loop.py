@@ -22,7 +22,7 @@ from anim.sampling.track import sample
 DURATION_TOLERANCE_FRACTION = 1e-6  # of the last key's time, of a blend as long as the clip: float32 and %g round
 MIN_BLEND_KEYS = 6  # fewest keys in a blend; sparser tracks get more
 BLEND_FPS = 30.0  # of the added keys
-MIN_SHARE = 1e-9  # of a blend before its last segment; less is rounding
+MIN_BEFORE_LAST_FRACTION = 1e-9  # of a blend before its last segment; less is rounding
 MIN_INTERVAL_S = 1e-5  # s, between two keys; more where float32 resolves less
 
 
@@ -200,7 +200,7 @@ def _end_slope(gap: Floats, before_last: Floats, duration: float, last: float) -
     The cubic is 0 with slope 0 at first, `gap` after `duration` seconds, and `before_last` at `last` seconds earlier.
     """
     share = 1 - last / duration
-    if share < MIN_SHARE:  # no key between, so no speed of the last segment but that of its ends
+    if share < MIN_BEFORE_LAST_FRACTION:  # no key between, so no speed of the last segment but that of its ends
         return np.zeros_like(gap)
     # c(s) = (3 g − m) s² + (m − 2 g) s³ with m the slope per duration, so that c(1) = g and c'(1) = m
     return (gap * (3 * share**2 - 2 * share**3) - before_last) / (share**2 * (1 - share)) / duration
@@ -231,10 +231,11 @@ class _Correction:
 def _times(track: StackedTracks, start: float, end: float, frame_rate: float | None) -> Floats:
     """Return the track's key times with the ends of the blend and, for sparse keys, some between."""
     keys = track.times
-    inside = keys[(keys > start) & (keys < end)]
+    inside, spacing = keys[(keys > start) & (keys < end)], (end - start) / MIN_BLEND_KEYS
     more = np.array([start, end])
     rotates = track.in_tangents is not None and track.kind is ValueKind.ROTATION  # normalized anew between its keys
-    if rotates or len(inside) < MIN_BLEND_KEYS or end - inside[-1] > (end - start) / MIN_BLEND_KEYS:
+    is_dense = len(inside) >= MIN_BLEND_KEYS and max(inside[0] - start, end - inside[-1]) <= spacing
+    if rotates or not is_dense:
         more = _added_times(start, end, frame_rate)
     more = more[distinct_float32(more)]
     more = more[np.abs(more[:, None] - keys).min(axis=1) > min_interval(end, MIN_INTERVAL_S)]

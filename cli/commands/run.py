@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -132,7 +132,8 @@ def command(
     except NoFileError:  # as after all inputs were deleted
         _warn_of_unused(book, chosen, (), record, reporter)
         if is_all and emit is None:
-            report_stale(record, book, (), outputs.WrittenFiles(), reporter, delete=delete_stale)
+            with _tolerate_unwritable(no_cache and not delete_stale, reporter):
+                report_stale(record, book, (), outputs.WrittenFiles(), reporter, delete=delete_stale)
         raise
     if not inputs:
         _warn_of_unused(book, chosen, planned, record, reporter)
@@ -147,15 +148,11 @@ def command(
     with ExitStack() as stack:
         cluster = None if scheduler is None else stack.enter_context(connect_cluster(scheduler))
         path, settings = folder / journals.NAME, book.path.name
-        try:
+        journal = journals.Journal(path, None, settings, {})  # unless one can be written
+        with _tolerate_unwritable(no_cache and not (resume or delete_stale), reporter):
             results.prepare()
             record.save_unsaved()  # before a new journal is begun
             journal = stack.enter_context(journals.open_journal(path, settings, len(planned), last, resume=resume))
-        except OutputError as error:
-            if not no_cache or resume or delete_stale:
-                raise
-            reporter.info(f"note: --resume and --delete-stale will not know of this run: {error}")
-            journal = journals.Journal(path, None, settings, {})
         run = RecipeRun(planned, journal, None if no_cache else results, reporter, processes, cluster)
         code = run.run()
     if not no_cache and run.counts[journals.MADE]:
@@ -167,6 +164,17 @@ def command(
             record.save(run.written)
     written = [os.path.relpath(book.folder / each) for each in run.written.inputs]
     return max(code, _check(written, quiet=quiet)) if check else code
+
+
+@contextmanager
+def _tolerate_unwritable(tolerated: bool, reporter: Reporter) -> Iterator[None]:
+    """Note that the journal and the record of outputs can't be written, instead of ending the run."""
+    try:
+        yield
+    except OutputError as error:
+        if not tolerated:
+            raise
+        reporter.info(f"note: --resume and --delete-stale will not know of this run: {error}")
 
 
 def _cache_folder(settings: Path, named: str | None) -> Path:

@@ -67,21 +67,23 @@ def _matches(pattern: str) -> list[FoundFile]:
     folder = os.path.dirname(pattern)
     while glob.has_magic(folder):
         folder = os.path.dirname(folder)  # the part before the first wildcard: "in" of "in/**/*.glb"
-    _check_readable(Path(folder or "."), os.path.relpath(pattern, folder or "."))
+    if ".." not in Path(pattern).parts:  # `relpath` would lead elsewhere than links do
+        _check_readable(Path(folder or "."), Path(os.path.relpath(pattern, folder or ".")))
     if not found:
         raise NoFileError(f"{pattern}: matches no file")
     return [FoundFile(each, folder or ".", is_searched=True) for each in found]
 
 
-def _check_readable(folder: Path, pattern: str) -> None:
+def _check_readable(folder: Path, pattern: Path) -> None:
     """Raise FormatError for a folder that can't be read and may have matching files: `glob` leaves them out.
 
     pattern: from the folder.
     """
+    named = {part for part in pattern.parts if part.startswith(".")}  # wildcards stand for no other hidden folder
     for place, folders, _ in walk(folder):
         above = Path(place).relative_to(folder)
-        visible = (each for each in folders if not each.startswith("."))  # as for wildcards
-        folders[:] = (each for each in visible if can_match_below((above / each).as_posix(), Path(pattern).as_posix()))
+        visible = (each for each in folders if not each.startswith(".") or each in named)
+        folders[:] = (each for each in visible if can_match_below((above / each).as_posix(), pattern.as_posix()))
 
 
 def walk(folder: Path) -> Iterator[tuple[str, list[str], list[str]]]:

@@ -27,7 +27,7 @@ def can_match_below(folder: str, pattern: str) -> bool:
 
 
 def _matched_counts(parts: tuple[str, ...], pattern: str) -> Iterator[set[int]]:
-    """Yield the counts of first parts of a path that match none of the pattern's parts, its first one, two, …"""
+    """Yield how many of the first parts of a path the first 0, 1, 2, … parts of a pattern match: all counts that do."""
     ends = {0}
     yield ends
     for each in _pattern_parts(pattern):

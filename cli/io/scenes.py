@@ -93,7 +93,7 @@ def _warn_of_constraints(document: Document, name: str, reporter: Reporter) -> N
         words = f" and {len(constrained) - 1} more have" if len(constrained) > 1 else " has"
         reporter.warn(
             f"{name}: {node_label(document.json, constrained[0])}{words} a constraint by {CONSTRAINT}, which is not "
-            "evaluated: players rotate such nodes, and what is below them, otherwise"
+            "evaluated: players may show such nodes, and those below them, in other rotations"
         )
 
 

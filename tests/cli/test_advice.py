@@ -55,6 +55,7 @@ def test_advice_for_a_player_runs(call: Call, tmp_path: Path) -> None:
     )
     line = COMMAND.search(first["advice"])
     assert line is not None
+    assert "--fps 60 " in first["advice"]  # the splines have a key or two a second, which is too few for lines
     call(line.group(1), source, output, *shlex.split(line.group(2))).product()
     assert call("check", output, *options).json["findings"] == []
 

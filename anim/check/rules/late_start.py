@@ -13,14 +13,14 @@ from anim.check.finding import Occurrence, Severity
 from anim.check.rule import Fix, Parameters, Rule
 from anim.gltf.document import Document
 from anim.measure.inspect.report import ClipReport
-from anim.model import Track
+from anim.measure.loops.loop_criteria import VISIBLE_GAP_PER_SIZE
+from anim.model import Clip, Track
 
 UNITY = "unity"
 LATE_TRACKS = "late tracks"
 ADD_KEYS = "to add keys at 0 s: gltf-anim check FILE --fix --select GA105 --target unity"
 REBASE = "if unintended, so that it loops without a pause: gltf-anim trim IN OUT --rebase"
 MIN_LATE_START_S = 5e-4  # s; starts below come from rounding, and no display shows them
-MAX_LOOP_GAP = 0.001  # of the model's size; GA107 finds larger ones
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -28,7 +28,7 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     for report, clip in file.clips:
         if report.start_s > MIN_LATE_START_S:
             found = file.in_clip(report.index, value=report.start_s, time_s=report.start_s)
-            yield replace(found, advice=REBASE, is_fixable=False) if _loops(file, report) else found
+            yield replace(found, advice=REBASE, is_fixable=False) if _loops(file, report, clip) else found
         elif parameters.target == UNITY:
             late = [float(track.times[0]) for track in clip.tracks if track.times[0] > MIN_LATE_START_S]
             if late:
@@ -36,9 +36,11 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
                 yield replace(found, advice=ADD_KEYS)
 
 
-def _loops(file: CheckedFile, report: ClipReport) -> bool:
-    """Return whether a clip loops from its first key, but for a frame: a pause before that key would be part of it."""
-    return report.index in file.missing_frames or report.seam_m <= MAX_LOOP_GAP * file.diagonal
+def _loops(file: CheckedFile, report: ClipReport, clip: Clip) -> bool:
+    """Return whether a clip moves and loops, but for a frame: a pause before its first key would be part of that."""
+    if report.constant_tracks == len(clip.tracks):
+        return False
+    return report.index in file.missing_frames or report.seam_m <= VISIBLE_GAP_PER_SIZE * file.diagonal
 
 
 def problem(found: Sequence[Occurrence]) -> str:

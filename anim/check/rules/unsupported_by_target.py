@@ -15,7 +15,7 @@ from anim.gltf.document import json_array
 from anim.model import Interpolation
 
 LEAVE_OUT = "leave it out where the file is made"
-TO_LINEAR = "gltf-anim resample IN OUT --fps {finer} --interpolation linear{clips}"
+TO_LINEAR = "gltf-anim resample IN OUT --fps {linear} --interpolation linear{clips}"
 AS_LINEAR = f"to write LINEAR keys: {TO_LINEAR}"
 AS_LINEAR_WITH_STEPS = f"to write LINEAR keys, and ramps of a frame for the STEP tracks: {TO_LINEAR}"
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from anim.gltf.document import Json, json_array
 from anim.gltf.validation import hierarchy
-from anim.model.skeleton import ancestors
+from anim.maths.hierarchy import with_ancestors
 
 CONSTRAINT = "VRMC_node_constraint"
 # A humanoid's clips, spring bones and constraints are relative to the rotations of the nodes at rest.
@@ -22,21 +24,24 @@ def constrained_nodes(json: Json) -> list[int]:
 
 
 def constraint_sources(json: Json) -> frozenset[int]:
-    """Return the nodes that move the constrained ones: sources, and those above the sources of aim constraints."""
-    nodes, found = json_array(json, "nodes"), set[int]()
-    constrained = constrained_nodes(json)
-    parents = hierarchy.parents(json) if constrained else []
-    for node in constrained:
+    """Return the nodes that move the constrained ones: sources, and of aim constraints both nodes with all above."""
+    nodes = json_array(json, "nodes")
+    found, aims = np.zeros(len(nodes), np.bool_), np.zeros(len(nodes), np.bool_)
+    for node in constrained_nodes(json):
         for kind, source in _sources(nodes[node]["extensions"][CONSTRAINT]):
             if 0 <= source < len(nodes):
-                found.add(source)
-                found.update(each for each in ancestors(parents, source) if kind == "aim")
-    return frozenset(found)
+                found[source] = True
+                if kind == "aim":
+                    aims[[node, source]] = True
+    if aims.any():
+        found |= with_ancestors(np.array(hierarchy.parents(json)), aims)
+    return frozenset(np.flatnonzero(found).tolist())
 
 
 def rest_pose_extensions(json: Json) -> list[str]:
     """Return the names of the extensions of a file that are relative to its rest pose."""
-    return [name for name in json.get("extensionsUsed", ()) if name in REST_POSE_EXTENSIONS]
+    found = [name for name in json.get("extensionsUsed", ()) if name in REST_POSE_EXTENSIONS]
+    return found or ([CONSTRAINT] if constrained_nodes(json) else [])
 
 
 def _sources(extension: Any) -> list[tuple[str, int]]:

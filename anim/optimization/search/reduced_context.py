@@ -15,8 +15,9 @@ from anim.sampling.pose import rest_world
 def reduce_context(context: Context, requests: Sequence[SearchRequest]) -> tuple[Context, list[SearchRequest]]:
     """Return the context and the requests of a search on a skeleton without the nodes that no clip of them moves.
 
-    Both unchanged if the skeleton is small, mostly moves, or has morph targets. Results of the search are the same:
-    they name tracks, no nodes. The new context is for searches only: `invisible` and `policy` are those of all nodes.
+    Both unchanged if the skeleton is small, mostly moves, or has morph targets. Results name tracks, no nodes; they are
+    the same but for rounding, and of long clips, which are searched in fewer parts. The new context is for searches
+    only: `invisible` and `policy` are those of all nodes.
     """
     skeleton = context.skeleton
     reduced = None

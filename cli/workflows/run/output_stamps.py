@@ -35,7 +35,7 @@ def stamp_buffers(folder: Path, output: str) -> dict[str, Stamp]:
     if not output.lower().endswith(".gltf"):
         return {}
     path = Path(output)
-    return _stamps(folder, [path.with_name(name).as_posix() for name in external_buffers(folder / path) if name])
+    return _stamps(folder, [(path.parent / name).as_posix() for name in external_buffers(folder / path) if name])
 
 
 def are_unchanged(folder: Path, stamps: Mapping[str, Stamp]) -> bool:

@@ -8,7 +8,6 @@ from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -39,7 +38,7 @@ class RecordedOutput(NamedTuple):
     input: str
     stamp: Stamp
     settings: str
-    buffers: Mapping[str, Stamp] = MappingProxyType({})
+    buffers: Mapping[str, Stamp]
 
 
 @dataclass

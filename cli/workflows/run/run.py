@@ -30,7 +30,7 @@ from cli.workflows.run.job import (
 )
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
 from cli.workflows.run.order import group_jobs, keys_read
-from cli.workflows.run.output_stamps import stamp_output
+from cli.workflows.run.output_stamps import OutputStamps, stamp_output
 from cli.workflows.run.outputs import WrittenFiles
 from cli.workflows.run.places import output_key
 from cli.workflows.run.stamps import stamp_of, stamp_read, status_of
@@ -106,7 +106,7 @@ class RecipeRun:
             if done is not None:
                 before = input_size(job) if self.reporter.verbose else 0  # for the line of --verbose
                 files = done.files or {}
-                stamps = stamp_output(job.folder, job.output)
+                stamps = None if done.output_stamp is None else OutputStamps(done.output_stamp, done.buffers, {})
                 result = JobResult(
                     errors.DONE, done.messages, done.size, done.input_stamp, 0.0, before, files, stamps=stamps
                 )

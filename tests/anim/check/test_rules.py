@@ -255,3 +255,12 @@ def test_a_clip_of_ignored_channels_is_not_empty() -> None:
     channel = {"sampler": 0, "target": {"path": "rotation"}}
     findings = find_all(checked(edited(put("animations/0/channels", [channel]))))
     assert not {"GA011", "GA113"} & {each.code for each in findings}
+
+
+def test_a_late_pose_is_no_loop() -> None:
+    """Nothing moves: a key at 0 s changes nothing, and is what the rule asks for."""
+    held = joint("translation", [[0, 1, 0], [0, 1, 0]], [1, 2])
+    (finding,) = found(with_tracks(held), "GA105")
+    assert "trim IN OUT --rebase" in finding.advice
+    assert "loops" not in finding.advice
+    assert finding.fixable == "safe"

@@ -107,6 +107,17 @@ def test_a_blend_over_a_whole_clip_leaves_its_first_segment() -> None:
     np.testing.assert_allclose(sample(new, before), sample(rise, before), atol=1e-12)
 
 
+@pytest.mark.parametrize("held", [1.5, 1.999])
+def test_a_gap_is_closed_over_the_whole_blend_where_a_pose_is_held_first(held: float) -> None:
+    """The dense keys at the end are no reason to close it there alone: it would be a jump."""
+    times = np.concatenate(([0.0], np.linspace(held, 2, 12)))
+    rise = track("translation", times, np.outer(3 * times, [1.0, 0, 0]), LINEAR)
+    (new,) = loop(Clip("", (rise,)), blend=2.0).tracks
+    places = sample(new, np.linspace(0, 2, 2001))[:, 0]
+    assert np.abs(np.diff(places)).max() / 1e-3 < 12
+    np.testing.assert_allclose(places[-1], places[0], atol=1e-6)
+
+
 def test_a_clip_too_short_for_a_key_in_the_blend_is_closed() -> None:
     short = track("translation", [0, 1.5e-5], np.array([[0.0, 0, 0], [1, 2, 3]]), LINEAR)
     (new,) = loop(Clip("", (short,)), blend=1.5e-5).tracks
