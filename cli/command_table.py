@@ -115,7 +115,7 @@ COMMANDS = {
         "Bake skinning and morph targets to vertex caches.",
         (
             "gltf-anim bake walk.glb walk.npz --method dqs --fps 30",
-            "gltf-anim bake hero.glb 'caches/{clip}.usdc' --fps 24 --normals",
+            "gltf-anim bake hero.glb '{clip}.usdc' --fps 24 --normals",
             "gltf-anim bake face.glb face.npz --clip talk --mesh Head --space mesh",
         ),
     ),

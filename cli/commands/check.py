@@ -100,7 +100,8 @@ def command(
     budget_report: Annotated[
         bool,
         typer.Option(
-            "--budget-report", help="Only list the values of budgets with their limits; exit 0 above them too."
+            "--budget-report",
+            help="Only list the values of budgets with their limits, as text or JSON; exit 0 above them too.",
         ),
     ] = False,
     list_rules: Annotated[bool, typer.Option("--list", help="List the rules.")] = False,
@@ -152,6 +153,8 @@ def command(
         return errors.DONE
     if known is not None and write_known is not None:
         raise UsageError("--baseline and --write-baseline can't be combined")
+    if budget_report and format not in (Format.TEXT, Format.JSON):
+        raise UsageError(f"--budget-report is text or JSON (got --format {format})")
     if write_known is not None and write_known != documents.PIPE:
         documents.check_file(write_known)
     expected = None if known is None else _load_baseline(known)
@@ -171,7 +174,8 @@ def command(
             error.help = "without FILE, stdin is read; for all files below this folder: gltf-anim check ."
     checker.warn_of_unused_budgets()
     if budget_report:
-        documents.write_text(check_report.budget_table(checker.headroom))
+        as_text = check_report.budget_json if format is Format.JSON else check_report.budget_table
+        documents.write_text(as_text(checker.headroom))
         return _worst(checker.refused, len(checker.files))
     if write_known is not None:
         kept = _unchecked(_written_baseline(write_known), checker.files, write_known)

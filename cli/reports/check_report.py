@@ -60,8 +60,8 @@ def text(report: CheckReport) -> str:
 
 
 def error_text(report: CheckReport) -> str:
-    """Return only the errors of the text, "" without one: even a quiet check shows them."""
-    lines = _findings([each for each in report.found if each[1].severity is Severity.ERROR])
+    """Return only what fails the check of the text, "" without it: even a quiet check shows that."""
+    lines = _findings([each for each in report.found if report.is_failure(*each)])
     return "".join(f"{escape_control(line)}\n" for line in lines)
 
 
@@ -120,6 +120,12 @@ def budget_table(rows: Sequence[tuple[str, str, float, float]]) -> str:
     if not cells:
         return "no checked file has a budget\n"
     return tables.text(["file", "budget", "value", "limit", "used"], cells, left=2, indent="")
+
+
+def budget_json(rows: Sequence[tuple[str, str, float, float]]) -> str:
+    """Return the rows of `budget_table` as one JSON document; the units are those of the budgets."""
+    named = [dict(zip(("file", "budget", "value", "limit"), row, strict=True)) for row in rows]
+    return json_report.dump({"schema": SCHEMA, "budgets": named})
 
 
 def as_json(report: CheckReport) -> str:

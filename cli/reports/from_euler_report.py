@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import degrees
@@ -51,7 +53,7 @@ def warnings(made: ConversionReport) -> Iterator[str]:
     yield from made.motion.notes
     if made.is_guess:
         yield f"scale: {made.scale_words}"
-    yield from _leading_pose(made.converted)
+    yield from _leading_pose(made.converted, is_alone=made.onto is None)
     if made.onto is not None and made.onto.num_bound:
         verb = "rests" if made.onto.num_bound == 1 else "rest"
         moved = f"{plural(made.onto.num_bound, 'joint')} of the character {verb} elsewhere than its skin was bound"
@@ -70,7 +72,7 @@ def lines(made: ConversionReport, *, verbose: bool) -> Iterator[str]:
     if made.gimbal:
         yield _gimbal_line(made.gimbal)
         if verbose:
-            yield _gimbal_table(made.gimbal)
+            yield from _gimbal_table(made.gimbal)
     if made.onto is not None and made.character is not None:
         yield from _onto_lines(made, made.onto, made.character, verbose=verbose)
 
@@ -110,13 +112,17 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
     return json_report.dump(content)
 
 
-def _leading_pose(converted: ImportedMotion) -> Iterator[str]:
-    """Words on a first frame apart from the motion, of a recording; adaptive keys aren't frames."""
+def _leading_pose(converted: ImportedMotion, *, is_alone: bool) -> Iterator[str]:
+    """Words on a first frame apart from the motion, of a recording; adaptive keys aren't frames.
+
+    is_alone: whether no other clips will be in the file.
+    """
     found = None if converted.tolerance is not None else find_leading_pose(converted.clip)
     if found is not None:
         joints = plural(found.num_joints, "joint")
         jump = f"{joints} jump to the next one, '{converted.skeleton.names[found.node]}' by {degrees(found.angle):.0f}°"
-        advice = f"`trim --from {np.float32(found.end)!s} --rebase` removes it from the clip"
+        chosen = "" if is_alone else f" --clip {shlex.quote(glob.escape(converted.clip.name))}"
+        advice = f"`trim --from {np.float32(found.end)!s} --rebase{chosen}` removes it from the clip"
         yield f"the first frame is a pose apart from the motion: {jump} ({advice})"
 
 
@@ -143,7 +149,7 @@ def _gimbal_line(rows: tuple[GimbalStats, ...]) -> str:
     return words
 
 
-def _gimbal_table(rows: tuple[GimbalStats, ...]) -> str:
+def _gimbal_table(rows: tuple[GimbalStats, ...]) -> list[str]:
     header = (
         "joint",
         "order",
@@ -169,7 +175,7 @@ def _gimbal_table(rows: tuple[GimbalStats, ...]) -> str:
         )
         for row in rows
     ]
-    return tables.text(header, cells).rstrip("\n")
+    return tables.text(header, cells).splitlines()
 
 
 def _onto_lines(made: ConversionReport, onto: CharacterClip, character: Skeleton, *, verbose: bool) -> Iterator[str]:

@@ -128,7 +128,9 @@ class FileChecker:
         for config in self._configs.values():
             for budget in config.budgets:
                 if budget not in self._used:
-                    self.reporter.warn(f"{config.path}: the budget '{budget.match}' matches no checked file")
+                    earlier = any(each.match == budget.match for each in config.budgets if each in self._used)
+                    why = "has the pattern of an earlier one, which counts" if earlier else "matches no checked file"
+                    self.reporter.warn(f"{config.path}: the budget '{budget.match}' {why}")
 
     def _report_faults(self, name: str, faults: Sequence[AnimError]) -> None:
         self.found += [(name, INVALID.finding([each], (), INVALID.severity)) for each in fault_occurrences(faults)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tomllib
 from pathlib import Path
@@ -172,6 +173,12 @@ def test_budgets_are_limits_for_matching_files(folder: Path, call: Call) -> None
     assert "matches no checked file" not in call("check", "noop.glb").err
     table = call("check", "noop.glb", "--budget-report").text
     assert [line.split()[1] for line in table.splitlines()[1:]] == ["bytes", "keys", "clips"]
+    rows = call("check", "noop.glb", "--budget-report", "--format", "json").json["budgets"]
+    assert [(each["file"], each["budget"]) for each in rows] == [
+        ("noop.glb", each) for each in ("bytes", "keys", "clips")
+    ]
+    assert rows[2]["value"] > rows[2]["limit"] == 3
+    assert "--format md" in refusal(call("check", "noop.glb", "--budget-report", "--format", "md"), 2)
 
 
 @pytest.mark.parametrize(
@@ -226,6 +233,19 @@ def test_sizes_of_budgets_take_units(folder: Path, call: Call) -> None:
     for limit, code in ((f"{size / 1e3}kB", 0), (f"{size / 1e3 - 0.001:.3f} kB", 6)):
         (folder / "gltf-anim.toml").write_text(f'[[budget]]\nmatch = "noop.glb"\nbytes = "{limit}"\n')
         assert call("check", "noop.glb").code == code
+
+
+def test_a_budget_behind_one_of_the_same_pattern_counts_nothing(folder: Path, call: Call) -> None:
+    twice = '[[budget]]\nmatch = "*.glb"\nclips = 9\n' * 2
+    (folder / "gltf-anim.toml").write_text(twice.replace("clips = 9", "keys = 100000", 1))
+    assert "the budget '*.glb' has the pattern of an earlier one, which counts" in call("check", ".").err
+
+
+def test_quiet_shows_every_finding_that_fails(folder: Path, call: Call) -> None:
+    whole, quiet = (call("check", "noop.glb", "--fail-on", "info", *more) for more in ((), ("-q",)))
+    assert (whole.code, quiet.code) == (6, 6)
+    in_quiet, in_all = (set(re.findall(r"^  \w+ +(GA\d{3})", run.text, re.MULTILINE)) for run in (quiet, whole))
+    assert in_quiet == in_all != set()
 
 
 def test_no_budget_is_said(folder: Path, call: Call) -> None:

@@ -229,3 +229,10 @@ def test_a_joint_with_a_matrix_is_taken_apart_when_it_gets_keys(call: Call, asse
     whole = [node for node in json.loads(character.read_text())["nodes"] if "matrix" in node]
     animated = {n["name"] for n in opened_path(out).json["nodes"] if "matrix" not in n}
     assert len(whole) > len([node for node in whole if node["name"] in animated]) > 0  # others keep theirs
+
+
+def test_the_table_of_joints_has_a_line_for_each(call: Call) -> None:
+    err = call("from-euler", "-", "-", "-v", stdin=SMALL).err
+    table = err[err.index("locked axes") :].splitlines()
+    assert "\\n" not in err
+    assert [line.split()[0] for line in table[1:3]] == ["hip", "knee"]
