@@ -98,12 +98,13 @@ PUBLIC = {
     "measure.continuity": "continuity knots",
     "measure.continuous_bound": "clip_groups largest_error prover sampled_clips",
     "measure.error": (
-        "error_curve metric motion_error point_matrix point_rows sample_times shell_points statistics surface "
-        "whole_scene"
+        "error_curve metric motion_error point_matrix point_rows reduced_skeleton sample_times shell_points statistics "
+        "surface whole_scene"
     ),
     "measure.inspect": ("contents frame_rate inspect report root_motion storage_cost stored_bytes track_statistics"),
     "measure.loops": (
-        "clip_ends divided_ranges end_frames joint_gaps loop_analysis loop_kind recommendations skin_motion"
+        "clip_ends divided_ranges end_frames joint_gaps loop_analysis loop_criteria loop_kind recommendations "
+        "skin_motion"
     ),
     "optimization.search": "plan",
     "optimization.tracks": "clip_ends needed_keys",

@@ -127,7 +127,10 @@ def test_the_version_is_one_line(call: Call) -> None:
 
 def test_the_exit_codes_are_in_the_help(call: Call) -> None:
     text = " ".join(call("--help").product().decode().split())
-    assert "0 done, 2 wrong usage, 3 invalid input, or a file that can't be read or written, 4 unsupported" in text
+    assert (
+        "0 done, 2 wrong usage, 3 invalid input, or a file that isn't there or can't be read or written, 4 unsupported"
+        in text
+    )
 
 
 @pytest.fixture(scope="module")
