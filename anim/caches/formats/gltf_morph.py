@@ -134,7 +134,8 @@ def _worst(positions: AnyArray, times: Floats, form: MorphEncoding) -> float:
             weights[:, i] = np.interp(times[rows], keys, column)
         placed = form.base + (weights @ flat).reshape(-1, *form.base.shape)
         off = (np.float32(form.scale) * placed - positions[rows]).astype(np.float64)
-        worst = max(worst, float(np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0))))
+        here = np.sqrt(np.einsum("fvi,fvi->fv", off, off).max(initial=0.0))
+        worst = float(np.maximum(worst, here))  # NaN stays, as of differences beyond float32: it is within no limit
     return worst
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from anim.arrays import AnyArray, Floats
+from anim.arrays import AnyArray, Floats, is_finite
 from anim.caches.storage import COPY_BYTES, Outputs
-from anim.errors import UnsupportedError
+from anim.errors import FormatError, UnsupportedError
 from anim.gltf.authoring_parts import INDICES, VERTICES, add_accessor, create_document, create_material
 from anim.gltf.document import Document
 from anim.gltf.io import container
@@ -46,8 +46,11 @@ class GlbFile:
         """Append rows (n, C), already of their stored type, and return the index of their accessor.
 
         width: bytes per vertex if greater than the row itself (rows of 3 shorts have a stride of 8).
+        Raises FormatError for floats that are not finite, as of differences beyond float32.
         """
         rows = np.ascontiguousarray(rows)
+        if rows.dtype.kind == "f" and not is_finite(rows):
+            raise FormatError("a difference of positions is too large for float32 (expected less than 3.4e38 m)")
         stride = None
         row_bytes = rows.shape[1] * rows.dtype.itemsize
         if target == VERTICES and row_bytes % 4:

@@ -188,3 +188,14 @@ def test_a_flip_book_of_others_is_refused() -> None:
     text = json.dumps({"asset": {"version": "2.0"}, "nodes": nodes}).encode()
     with pytest.raises(FormatError, match="flip-book"):
         opened(Memory("a.glb", {"a.glb": text}))
+
+
+def test_shapes_beyond_float32_are_no_encoding() -> None:
+    """Two positions near its largest number gave shapes of NaN, with "max 0 mm"."""
+    positions = np.zeros((5, 9, 3))
+    positions[1, 0, 1], positions[4, 1, 2] = 3.31896e38, 2.75096e38
+    with np.errstate(all="ignore"):
+        files, result = written(from_arrays(np.arange(5.0), positions, FACES), "a.glb")
+    assert result.max_error is not None
+    assert np.isfinite(result.max_error)
+    assert np.isfinite(played(files.files["a.glb"], np.arange(5.0))).all()
