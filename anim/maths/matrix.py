@@ -122,11 +122,11 @@ def accumulate_world(local: Floats, parents: Ints, levels: list[Ints], *, in_pla
 def accumulate_from_tops(local: Floats, parents: Ints, levels: list[Ints]) -> Floats:
     """Return the products (N, 3, 4) of matrices on the path from each node's top to it.
 
-    parents: (N,), −1 for tops, which need not be roots. levels: of the whole hierarchy, as of `accumulate_world`.
+    parents: (N,), −1 for tops. local: (N, 3, 4), the identity for tops that are not roots of the hierarchy. levels: of
+    the whole hierarchy, as of `accumulate_world`.
     """
-    above = np.append(np.where(parents < 0, len(parents), parents), len(parents))  # of tops: an identity, the last row
-    rows = np.concatenate((local, np.eye(4)[None, :3]))[:, None]
-    return accumulate_world(rows, above, levels, in_place=True)[:-1, 0]
+    above = np.where(parents < 0, np.arange(len(parents)), parents)  # of a top its own identity
+    return accumulate_world(local[:, None].copy(), above, levels, in_place=True)[:, 0]
 
 
 def _multiply_columns(above: Floats, own: Floats) -> Floats:

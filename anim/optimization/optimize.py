@@ -16,7 +16,8 @@ from anim.model import Clip, Scene
 from anim.optimization import writing
 from anim.optimization.clip import Task
 from anim.optimization.clip_batches import batch_clips
-from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, VerificationRequest, optimize_clips
+from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, VerificationRequest
+from anim.optimization.optimize_clips import optimize_clips
 from anim.optimization.options import Request
 from anim.optimization.process_pool import process_pool
 from anim.optimization.rest_pose import RebasedDocument, rebase

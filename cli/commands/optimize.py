@@ -67,7 +67,7 @@ def command(
             "--max-bytes",
             metavar="SIZE",
             help="Maximum file size, like 800kB: the result has the smallest error found that fits, not the fewest "
-            "bytes. Exit 6 if that error is above --max-error, else 10 % of the model's size.",
+            "bytes. Exit 6 if that error is above --max-error, or without it above 10 % of the model's size.",
         ),
     ] = None,
     meshopt: Annotated[

@@ -18,8 +18,8 @@ import numpy as np
 
 from anim.errors import AnimError, DataRangeError, FormatError, OutputError
 from anim.files import resolver
-from anim.gltf.document import Bytes, Document, json_array, node_label
-from anim.gltf.io import container, uri
+from anim.gltf.document import Bytes, Document, node_label
+from anim.gltf.io import container
 from anim.gltf.io.source import (
     Opener,
     Source,
@@ -290,15 +290,3 @@ def _stdin(read: Callable[[io.BufferedReader], bytes]) -> Bytes:
         raise UsageError("no input: name a file, or pipe a GLB into stdin")
     buffer = sys.stdin.buffer
     return np.frombuffer(read(buffer) if isinstance(buffer, io.BufferedReader) else buffer.read(), np.uint8)
-
-
-def missing(document: Document, folder: Path | None) -> Iterator[tuple[str, str, str]]:
-    """Yield label, JSON pointer and problem of every image that is not found from the input's folder."""
-    for i, about in enumerate(json_array(document.json, "images")):
-        address = about.get("uri")
-        if folder is None or address is None or uri.is_data(address):
-            continue
-        try:
-            resolver.locate(folder, uri.relative_path(address))
-        except FormatError as error:
-            yield f"image {i}", f"/images/{i}/uri", error.problem

@@ -121,7 +121,8 @@ def _leading_pose(converted: ImportedMotion, *, is_alone: bool) -> Iterator[str]
     if found is not None:
         joints = plural(found.num_joints, "joint")
         jump = f"{joints} jump to the next one, '{converted.skeleton.names[found.node]}' by {degrees(found.angle):.0f}°"
-        chosen = "" if is_alone else f" --clip {shlex.quote(glob.escape(converted.clip.name))}"
+        name = "" if is_alone else converted.clip.name
+        chosen = f" --clip {shlex.quote(glob.escape(name))}" if name else ""
         advice = f"`trim --from {np.float32(found.end)!s} --rebase{chosen}` removes it from the clip"
         yield f"the first frame is a pose apart from the motion: {jump} ({advice})"
 

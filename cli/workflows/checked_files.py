@@ -6,11 +6,13 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
+from pathlib import Path
 
 from anim.check.checked_file import CheckedFile
-from anim.errors import AnimError
-from anim.gltf.document import Bytes, Document
-from anim.gltf.io import container
+from anim.errors import AnimError, FormatError
+from anim.files import resolver
+from anim.gltf.document import Bytes, Document, json_array
+from anim.gltf.io import container, uri
 from anim.gltf.io.buffers import Resolve
 from anim.gltf.io.lenient import BrokenFile, read_broken, unread_buffers
 from anim.gltf.io.source import Source
@@ -37,7 +39,19 @@ def open_checked(
         chosen = selection.chosen_clips(reader.names(document)) if selection and selection.clips else None
         contents = read_contents(document, file_bytes=source.size, broken=opener.broken)
         facts = inspect(contents, chosen=chosen, tracks=tracks)
-        yield source, CheckedFile(contents, facts, tuple(documents.missing(document, source.folder)))
+        yield source, CheckedFile(contents, facts, tuple(_missing_images(document, source.folder)))
+
+
+def _missing_images(document: Document, folder: Path | None) -> Iterator[tuple[str, str, str]]:
+    """Yield label, JSON pointer and problem of every image that is not found from the input's folder."""
+    for i, about in enumerate(json_array(document.json, "images")):
+        address = about.get("uri")
+        if folder is None or address is None or uri.is_data(address):
+            continue
+        try:
+            resolver.locate(folder, uri.relative_path(address))
+        except FormatError as error:
+            yield f"image {i}", f"/images/{i}/uri", error.problem
 
 
 def fault_of(path: str, error: AnimError) -> AnimError:

@@ -22,7 +22,7 @@ from anim.measure.continuous_bound.prover import Prover
 from anim.measure.error.metric import ErrorMetric
 from anim.measure.loops import loop_analysis
 from anim.model import Clip, TimeAxis
-from anim.optimization import clip_optimizer
+from anim.optimization import optimize_clips
 from anim.sampling.pose import PoseSampler
 from anim.skinning.analysis import enclosed_volume, method_scores
 from cli.workflows import mesh_pairs
@@ -130,7 +130,7 @@ def test_equal_clips_are_optimized_once(call: Call, tmp_path: Path, monkeypatch:
     ]
     path = tmp_path / "in.gltf"
     path.write_bytes(text({"nodes": [{"name": "n"}], **keys, "animations": clips}))
-    counted = count_calls(monkeypatch, clip_optimizer, "_optimize")
+    counted = count_calls(monkeypatch, optimize_clips, "_optimize")
     call("optimize", path, tmp_path / "out.glb", "--max-error", "1mm", "--jobs", "1").product()
     assert len(counted) == 2
     found = clips_of((tmp_path / "out.glb").read_bytes())

@@ -15,7 +15,8 @@ ADVICE = {
     **dict.fromkeys(("bytes", "animation_bytes", "keys", "keys_per_second"), OPTIMIZE),
     ERROR: "make it with smaller errors in all of its steps, or change the limit",
 }
-BARELY, TIMES = 1.01, 10.0  # of the limit: a fraction of a percent above it, and more than percents tell
+MAX_PRECISE_RATIO = 1.01  # of the limit: above, no fractions of a percent
+MIN_TIMES_RATIO = 10.0  # of the limit: from here on "12 times", not "1200 %"
 
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
@@ -31,9 +32,9 @@ def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
 
 def _share(ratio: float) -> str:
     """A value as a part of its limit: "100.2 %", "134 %", "5837 times"."""
-    if ratio >= TIMES:
+    if ratio >= MIN_TIMES_RATIO:
         return f"{ratio:.4g} times"
-    return f"{100 * ratio:.1f} %" if ratio < BARELY else f"{100 * ratio:.0f} %"
+    return f"{100 * ratio:.1f} %" if ratio < MAX_PRECISE_RATIO else f"{100 * ratio:.0f} %"
 
 
 RULE = Rule(

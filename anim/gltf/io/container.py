@@ -21,10 +21,10 @@ MAGIC = b"glTF"
 JSON_CHUNK = 0x4E4F534A
 BIN_CHUNK = 0x004E4942
 MAX_GLB_BYTES = 2**32 - 1  # bytes; the header's length field has 32 bits
-_CACHE_HELP = "if it is a vertex cache: view and render show it, convert-cache makes .glb of it, diff compares it"
+CACHE_HELP = "if it is a vertex cache: view and render show it, convert-cache makes .glb of it, diff compares it"
 OTHER_FORMATS = {  # first bytes, and the commands that read them
     b"HIERARCHY": "gltf-anim from-euler makes glTF of BVH",
-    **dict.fromkeys((b"PK", b"POINTCACHE2", b"PXR-USDC", b"#USDA"), _CACHE_HELP),  # PK: .npz and .usdz
+    **dict.fromkeys((b"PK", b"POINTCACHE2", b"PXR-USDC", b"#USDA"), CACHE_HELP),  # PK: .npz and .usdz
 }
 LFS_POINTER = b"version https://git-lfs"
 

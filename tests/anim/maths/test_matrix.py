@@ -37,7 +37,8 @@ def test_products_from_tops_are_those_of_each_node_after_its_parent(count: int) 
     local = matrix.from_trs(random.normal(size=(count, 3)), rotation, np.ones((count, 3)))
     whole = np.array([-1, *(int(random.integers(max(i - 3, 0), i)) for i in range(1, count))])
     parents = whole.copy()
-    parents[[5, 170, count // 2]] = -1
+    tops = [5, 170, count // 2]
+    parents[tops], local[tops] = -1, np.eye(4)[:3]
     levels = levels_of(whole.tolist())
     assert hierarchy.is_deep(levels) == (count == 2000)
     found = matrix.accumulate_from_tops(local, parents, levels)

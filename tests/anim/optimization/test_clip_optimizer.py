@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from anim.model import Clip
-from anim.optimization import clip_optimizer as site_
+from anim.optimization import optimize_clips as site_
 from anim.optimization.clip import Solving, Task, solve
-from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
+from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult
+from anim.optimization.optimize_clips import optimize_clips
 from anim.optimization.options import Bounds, Effort, Packing, Request
 from anim.optimization.search.context import Context
 from anim.optimization.search.lockstep import SearchRequest

@@ -15,8 +15,9 @@ from anim.measure.error.metric import ErrorMetric
 from anim.measure.error.point_groups import SkinnedGroups
 from anim.measure.error.sample_times import dense_times
 from anim.measure.error.statistics import statistics
-from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Skin
+from anim.model import Clip, MeshInstance, Scene, Skin
 from anim.sampling.players import PLAYERS
+from tests.anim.measure.error.branched_scenes import branches, mesh
 from tests.clips import clip, track
 
 NODES = 60
@@ -28,46 +29,18 @@ def _reduce_small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reduced_skeleton, "MIN_NODES", 1)
 
 
-def _skeleton(random: np.random.Generator) -> Skeleton:
-    """Branches of long bones, scaled, one of the nodes by a shear."""
-    parents = np.array([-1, *(int(random.integers(max(i - 4, 0), i)) for i in range(1, NODES - 3)), -1, NODES - 3, -1])
-    shear = np.eye(4)[None, :3] + 0.2 * random.normal(size=(1, 3, 4))
-    return Skeleton(
-        tuple(f"n{i}" for i in range(NODES)),
-        parents,
-        0.3 * random.normal(size=(NODES, 3)),
-        quaternion.normalize(random.normal(size=(NODES, 4))),
-        random.uniform(0.8, 1.2, (NODES, 3)),
-        np.array([20]),
-        shear,
-    )
-
-
-def _mesh(random: np.random.Generator, name: str, joints: int, targets: int) -> Mesh:
-    weights = random.uniform(size=(5, 2)) + 0.1
-    return Mesh(
-        name,
-        random.normal(size=(5, 3)),
-        np.array([[0, 1, 2], [2, 3, 4]]),
-        random.integers(0, joints, (5, 2)) if joints else np.empty((5, 0), np.int64),
-        weights / weights.sum(axis=1, keepdims=True) if joints else np.empty((5, 0)),
-        0.2 * random.normal(size=(targets, 5, 3)),
-        np.zeros(targets),
-    )
-
-
 def _scene(random: np.random.Generator, *, meshes: bool) -> Scene:
-    skeleton = _skeleton(random)
+    skeleton = branches(random, NODES)
     if not meshes:
         return Scene(skeleton, ())
     skin = Skin(random.permutation(NODES)[:8], np.eye(4)[None, :3] + 0.3 * random.normal(size=(8, 3, 4)))
-    rigid = [MeshInstance(i, _mesh(random, f"m{i}", 0, 0), None, np.empty(0)) for i in range(2, NODES, 3)]
+    rigid = [MeshInstance(i, mesh(random, f"m{i}", 0, 0), None, np.empty(0)) for i in range(2, NODES, 3)]
     return Scene(
         skeleton,
         (
-            MeshInstance(1, _mesh(random, "body", 8, 0), skin, np.empty(0)),
-            MeshInstance(30, _mesh(random, "face", 0, 2), None, np.zeros(2)),
-            MeshInstance(31, _mesh(random, "head", 8, 2), skin, np.array([0.3, 0])),
+            MeshInstance(1, mesh(random, "body", 8, 0), skin, np.empty(0)),
+            MeshInstance(30, mesh(random, "face", 0, 2), None, np.zeros(2)),
+            MeshInstance(31, mesh(random, "head", 8, 2), skin, np.array([0.3, 0])),
             *rigid,
         ),
     )
@@ -165,13 +138,13 @@ def test_errors_of_skins_on_one_moving_node(width: int) -> None:
     """Also with one influence per vertex, where the surface is rigid then."""
     random = np.random.default_rng(3)
     weights = random.uniform(size=(5, width)) + 0.1
-    mesh = replace(
-        _mesh(random, "body", 8, 0),
+    body = replace(
+        mesh(random, "body", 8, 0),
         joints=random.integers(0, 8, (5, width)),
         weights=weights / weights.sum(axis=1, keepdims=True),
     )
     skin = Skin(np.arange(8), np.eye(4)[None, :3] + 0.3 * random.normal(size=(8, 3, 4)))
-    scene = Scene(_skeleton(random), (MeshInstance(1, mesh, skin, np.empty(0)),))
+    scene = Scene(branches(random, NODES), (MeshInstance(1, body, skin, np.empty(0)),))
     before, after = clip(track("translation", TIMES, np.eye(3), node=0)), clip()
     whole, less = ErrorMetric(scene), ErrorMetric(scene, clips=(before, after))
     for each in (whole, less):

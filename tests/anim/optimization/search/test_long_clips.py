@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from anim.model import Clip, Interpolation
-from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult, optimize_clips
+from anim.optimization.clip_optimizer import ClipOptimizer, ClipResult
+from anim.optimization.optimize_clips import optimize_clips
 from anim.optimization.options import EFFORTS, Bounds, Drop, Packing, Policy, Reference, Request
 from anim.optimization.search import long_clips
 from anim.optimization.search.clip_parts import cut_clip, find_cuts

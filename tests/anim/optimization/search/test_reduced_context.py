@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anim.maths import quaternion
 from anim.measure.error import reduced_skeleton
-from anim.model import Clip, Mesh, MeshInstance, Scene, Skeleton, Skin
+from anim.model import Clip, MeshInstance, Scene, Skin
 from anim.optimization.options import EFFORTS, Bounds
 from anim.optimization.search.lockstep import SearchRequest
 from anim.optimization.search.long_clips import search_all
 from anim.optimization.search.reduced_context import reduce_context
 from anim.sampling.pose import sample_pose
 from anim.sampling.world import world_by_node
+from tests.anim.measure.error.branched_scenes import branches, mesh
 from tests.anim.optimization.making import scene, setting_of, turning, waving
 from tests.clips import clip, track
 
@@ -29,35 +29,13 @@ def _reduce_small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reduced_skeleton, "MIN_NODES", 50)
 
 
-def _mesh(random: np.random.Generator, name: str, joints: int) -> Mesh:
-    weights = random.uniform(size=(6, 2)) + 0.1
-    return Mesh(
-        name,
-        random.normal(size=(6, 3)),
-        np.array([[0, 1, 2], [3, 4, 5]]),
-        random.integers(0, joints, (6, 2)) if joints else np.empty((6, 0), np.int64),
-        weights / weights.sum(axis=1, keepdims=True) if joints else np.empty((6, 0)),
-        np.empty((0, 6, 3)),
-        np.empty(0),
-    )
-
-
 def _scene(seed: int) -> Scene:
-    """Branches, one of them sheared, with rigid meshes on some nodes, and a skin of moving and of static joints."""
+    """Branches with rigid meshes on some nodes, and a skin of moving and of static joints."""
     random = np.random.default_rng(seed)
-    parents = np.array([-1, *(int(random.integers(max(i - 4, 0), i)) for i in range(1, NODES - 2)), -1, NODES - 2])
-    skeleton = Skeleton(
-        tuple(f"n{i}" for i in range(NODES)),
-        parents,
-        0.3 * random.normal(size=(NODES, 3)),
-        quaternion.normalize(random.normal(size=(NODES, 4))),
-        random.uniform(0.8, 1.2, (NODES, 3)),
-        np.array([20]),
-        np.eye(4)[None, :3] + 0.2 * random.normal(size=(1, 3, 4)),
-    )
+    skeleton = branches(random, NODES)
     skin = Skin(random.permutation(NODES)[:8], np.eye(4)[None, :3] + 0.3 * random.normal(size=(8, 3, 4)))
-    rigid = [MeshInstance(i, _mesh(random, f"m{i}", 0), None, np.empty(0)) for i in range(2, NODES, 5)]
-    return Scene(skeleton, (MeshInstance(1, _mesh(random, "body", 8), skin, np.empty(0)), *rigid))
+    rigid = [MeshInstance(i, mesh(random, f"m{i}", 0), None, np.empty(0)) for i in range(2, NODES, 5)]
+    return Scene(skeleton, (MeshInstance(1, mesh(random, "body", 8), skin, np.empty(0)), *rigid))
 
 
 def _clip() -> Clip:
@@ -107,7 +85,7 @@ def test_scenes_that_mostly_move_or_have_morph_targets_stay() -> None:
     small = setting_of(scene(), (waving(),))
     assert reduce_context(small, [_request(waving())])[0] is small
     of = _scene(0)
-    face = replace(_mesh(np.random.default_rng(0), "face", 0), targets=np.ones((1, 6, 3)), rest_weights=np.zeros(1))
+    face = mesh(np.random.default_rng(0), "face", 0, targets=1)
     of = replace(of, instances=(*of.instances, MeshInstance(30, face, None, np.zeros(1))))
     morphed = setting_of(of, (_clip(),))
     assert reduce_context(morphed, [_request(_clip())])[0] is morphed
