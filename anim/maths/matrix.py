@@ -130,8 +130,14 @@ def accumulate_from_tops(local: Floats, parents: Ints, levels: list[Ints]) -> Fl
 
 
 def _multiply_columns(above: Floats, own: Floats) -> Floats:
-    """Products of matrices given as (..., 4, 3, F)."""
-    product: Floats = np.einsum("njif,nkjf->nkif", above[:, :3], own)
+    """Products of matrices given as (..., 4, 3, F), the same in both ways; of one frame `einsum` takes longer."""
+    product: Floats
+    if own.shape[-1] == 1:
+        product = above[:, None, 0] * own[:, :, 0, None]
+        product += above[:, None, 1] * own[:, :, 1, None]
+        product += above[:, None, 2] * own[:, :, 2, None]
+    else:
+        product = np.einsum("njif,nkjf->nkif", above[:, :3], own)
     product[:, 3] += above[:, 3]
     return product
 

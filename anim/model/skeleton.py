@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from anim import arrays
-from anim.arrays import Bools, Floats, Ints
+from anim.arrays import AnyArray, Bools, Floats, Ints
 from anim.errors import FormatError, ShapeError
 from anim.maths import hierarchy
 from anim.model.morphed_node import MorphedNode
@@ -83,15 +83,20 @@ class Skeleton:
         found[node] = True
         return hierarchy.with_descendants(self.parents, found)
 
-    def derive(self, compute: Callable[[Skeleton], Floats]) -> Floats:
+    def derive(self, compute: Callable[[Skeleton], AnyArray]) -> AnyArray:
         """Return the array that a function computes from this skeleton, read-only: computed once, kept here.
 
         compute: a function of a module; one that is made for the call would be kept, and never found again.
         """
         if compute not in self._derived:
             self._derived[compute] = arrays.own(compute(self))
-        found: Floats = self._derived[compute]
+        found: AnyArray = self._derived[compute]
         return found
+
+    def subtrees(self) -> tuple[Ints, Ints]:
+        """Return the range (N,), (N,) of each node's subtree in depth-first order, as `hierarchy.find_subtrees`."""
+        first, end = self.derive(_find_subtrees)
+        return first, end
 
     def levels(self) -> list[Ints]:
         """Return the nodes by depth, roots first, so that parents precede their children."""
@@ -127,6 +132,10 @@ def nearest_at_or_above(parents: Ints, chosen: Bools) -> Ints:
     return np.where(chosen, np.arange(len(parents)), nearest_ancestors(parents, chosen))
 
 
+def _find_subtrees(skeleton: Skeleton) -> AnyArray:
+    return np.stack(hierarchy.find_subtrees(skeleton.parents))
+
+
 def _find_levels(parents: Ints) -> tuple[Ints, ...]:
     """The nodes of each depth; raises FormatError for a cycle or a parent that does not exist.
 
@@ -136,14 +145,11 @@ def _find_levels(parents: Ints) -> tuple[Ints, ...]:
         raise FormatError("a node's parent does not exist")
     by_parent = np.argsort(parents, kind="stable")
     ends = np.cumsum(np.bincount(parents + 1, minlength=len(parents) + 1)).tolist()  # of children, after the roots
-    children, order, starts = by_parent.tolist(), by_parent[: ends[0]].tolist(), [0]
-    while starts[-1] < len(order):
-        level = order[starts[-1] :]
-        starts.append(len(order))
-        for node in level:
-            if ends[node] < ends[node + 1]:
-                order += children[ends[node] : ends[node + 1]]
+    children, order = by_parent.tolist(), by_parent[: ends[0]].tolist()
+    for node in order:  # grows during the loop
+        order += children[ends[node] : ends[node + 1]]
     if len(order) != len(parents):
         raise FormatError("nodes form a cycle (expected trees)")
     found = arrays.freeze(np.array(order, np.int64))
-    return tuple(found[start:end] for start, end in pairwise(starts))
+    sizes = np.bincount(hierarchy.find_depths(parents))
+    return tuple(found[start:end] for start, end in pairwise([0, *np.cumsum(sizes).tolist()]))

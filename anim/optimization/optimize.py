@@ -85,9 +85,10 @@ def optimize(
     solutions = {number: each.solution.named(clips[number].name) for number, each in found.items()}
     verdicts = {number: each.verdict for number, each in found.items()}
     without_loss = [number for number, each in found.items() if each.without_loss]
-    new = write_solutions(base.document if base else document, solutions, request.packing)
+    written = {number: each for number, each in solutions.items() if clips[number].tracks}
+    new = write_solutions(base.document if base else document, written, request.packing)
     read_back = reader.clips(new, limited=False)
-    for number in changed_clips(read_back, solutions):
+    for number in changed_clips(read_back, written):
         (verdicts[number],) = optimizer.verify([VerificationRequest(number, read_back[number])])
     done = writing.add_mark(new, read_back, _options(request, chosen))
     return Optimized(done, solutions, verdicts, base.moved if base else (), tuple(without_loss))
@@ -146,7 +147,9 @@ def _results(
     progress: Callable[[float], None],
 ) -> dict[int, ClipResult]:
     """The result of each chosen clip; equal clips are searched once, and those with earlier results not at all."""
-    waiting = [number for number in chosen if number not in earlier]
+    unsearched = [number for number in chosen if number not in earlier]
+    empty = [number for number in unsearched if not optimizer.clips[number].tracks]
+    waiting = [number for number in unsearched if optimizer.clips[number].tracks] + empty[:1]
     tasks = _tasks(optimizer, waiting) if waiting else []
     first = _first_equal(tasks)
     distinct = [task for n, task in enumerate(tasks) if first[n] == n]
@@ -162,6 +165,7 @@ def _results(
             found.update(zip((number for number, _ in batch), some, strict=True))
             progress(len(found) / len(distinct))
     found = {number: found[tasks[first[n]][0]] for n, (number, _) in enumerate(tasks)}
+    found |= dict.fromkeys(empty, found[empty[0]]) if empty else {}
     return {number: earlier[number] if number in earlier else found[number] for number in chosen}
 
 
@@ -210,6 +214,8 @@ def _tasks(optimizer: ClipOptimizer, chosen: Sequence[int]) -> list[tuple[int, T
 def _check_durations(clips: Sequence[Clip], chosen: Sequence[int]) -> None:
     """Raise UnsupportedError for a clip that lasts too long to measure between keys, as `frame_times` does."""
     for number in chosen:
+        if not clips[number].tracks:
+            continue
         try:
             check_duration(0.0, clips[number].end, fps=FPS, help=SHORTER_CLIP)
         except AnimError as error:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from anim.arrays import Floats, Ints
-from anim.maths import hierarchy
 from anim.model import Clip, MeshInstance, Scene, Skeleton, Skin, Track, parse_weight_pointer
 
 MIN_NODES = 64  # of a scene that is divided: with fewer a part saves nothing
@@ -49,7 +48,7 @@ class SceneDivider:
         if not self.max_nodes:
             return
         self._parents = skeleton.parents.tolist()
-        first, end = hierarchy.find_subtrees(skeleton.parents)
+        first, end = skeleton.subtrees()
         self._order = np.argsort(first).tolist()
         self._first, self._end = first.tolist(), end.tolist()
         self._instances: dict[int, list[int]] = {}

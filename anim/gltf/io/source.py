@@ -160,12 +160,9 @@ def copy_external_images(
 
 def glb_chunks(document: Document, unchanged: Bytes | None = None) -> list[Bytes]:
     """Return the chunks of a GLB; `unchanged` itself if it is a GLB with all its buffers."""
-    content = container.glb(document)
-    return (
-        [unchanged]
-        if unchanged is not None and container.is_glb(unchanged) and not external_size(document)
-        else content
-    )
+    if unchanged is not None and container.is_glb(unchanged) and not external_size(document):
+        return [unchanged]
+    return container.glb(document)
 
 
 def external_size(document: Document) -> int:

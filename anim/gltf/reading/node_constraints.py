@@ -20,7 +20,8 @@ REST_POSE_EXTENSIONS = frozenset({"VRM", "VRMC_vrm", "VRMC_springBone", CONSTRAI
 
 def constrained_nodes(json: Json) -> list[int]:
     """Return the indices of the nodes with a constraint."""
-    return [i for i, node in enumerate(json_array(json, "nodes")) if CONSTRAINT in (node.get("extensions") or {})]
+    nodes = enumerate(json_array(json, "nodes"))
+    return [i for i, node in nodes if "extensions" in node and CONSTRAINT in (node["extensions"] or {})]
 
 
 def constraint_sources(json: Json) -> frozenset[int]:

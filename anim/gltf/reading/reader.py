@@ -125,7 +125,7 @@ def scene(
     nodes = json_array(document.json, "nodes")
     instances = []
     parents = hierarchy.parents(document.json) if skeleton is None else skeleton.parents.tolist()
-    for number in depth_first(document.json, parents):
+    for number in depth_first(document.json, parents) if any("mesh" in node for node in nodes) else ():
         node = nodes[number]
         if "mesh" not in node:
             continue
@@ -200,6 +200,8 @@ def _check(document: object) -> None:
 
 def _clip(number: int, animation: Json, reader: animations.Reader) -> Clip:
     name = animation.get("name", "")
+    if not animation["channels"]:
+        return Clip(name, ())
     try:
         tracks = [reader.track(animation, i) for i in range(len(animation["channels"]))]
         return Clip(name, tuple([track for track in tracks if track is not None]))

@@ -38,6 +38,8 @@ def check(json: Json) -> None:
     """
     count = len(json_array(json, "nodes"))
     for i, animation in enumerate(json_array(json, "animations")):
+        if not animation["channels"]:
+            continue
         targets = [channel_target(channel) for channel in animation["channels"]]
         animated = [(each[0], each[1]) for each in targets if each is not None and each[0] is not None]
         if len(set(animated)) == len(animated) and max([node for node, _ in animated], default=0) < count:

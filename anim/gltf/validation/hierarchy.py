@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import chain
+
+import numpy as np
+
+from anim.arrays import Ints
 from anim.errors import FormatError
 from anim.gltf.document import Json, json_array
 
 
 def parents(json: Json) -> list[int]:
     """Return each node's parent, −1 for roots. Raises FormatError for a second parent or a cycle."""
-    nodes = json_array(json, "nodes")
-    parent = [-1] * len(nodes)
-    for i, node in enumerate(nodes):
-        for child in node.get("children", ()):
-            if parent[child] >= 0:
-                raise FormatError(f"has two parents ({parent[child]} and {i})", where=f"nodes[{child}]")
-            parent[child] = i
-    _check_forest(nodes, parent)
-    return parent
+    listed = [node.get("children", ()) for node in json_array(json, "nodes")]
+    children = list(chain.from_iterable(listed))
+    parent = np.full(len(listed), -1)
+    parent[children] = np.repeat(np.arange(len(listed)), list(map(len, listed)))
+    if np.count_nonzero(parent >= 0) < len(children):
+        raise _second_parent(listed)
+    _check_forest(parent)
+    found: list[int] = parent.tolist()
+    return found
 
 
 def check(json: Json) -> None:
@@ -38,10 +44,23 @@ def check(json: Json) -> None:
             )
 
 
-def _check_forest(nodes: list[Json], parent: list[int]) -> None:
-    reached = [i for i, above in enumerate(parent) if above < 0]
-    for node in reached:  # grows during the loop
-        reached.extend(nodes[node].get("children", ()))
-    if len(reached) < len(nodes):
-        lost = min(set(range(len(nodes))) - set(reached))
-        raise FormatError("lies on a cycle (expected trees)", where=f"nodes[{lost}]")
+def _second_parent(listed: Sequence[Sequence[int]]) -> FormatError:
+    """The error of the first child that is listed twice. listed: the children of each node."""
+    parent: dict[int, int] = {}
+    for i, children in enumerate(listed):
+        for child in children:
+            if child in parent:
+                return FormatError(f"has two parents ({parent[child]} and {i})", where=f"nodes[{child}]")
+            parent[child] = i
+    raise ValueError("no child has two parents")
+
+
+def _check_forest(parent: Ints) -> None:
+    """Raise FormatError for a cycle. Each step looks twice as far up: a path longer than all nodes has no end."""
+    above = parent
+    for _ in range(len(parent).bit_length()):
+        if not (above >= 0).any():
+            return
+        above = np.where(above >= 0, above[above], -1)
+    if (lost := np.flatnonzero(above >= 0)).size:
+        raise FormatError("lies on a cycle (expected trees)", where=f"nodes[{int(lost[0])}]")

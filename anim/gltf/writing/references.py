@@ -68,6 +68,9 @@ def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
 
     As JSON pointers: ["/nodes/3/extensions/ACME_path"]. Those bytes are kept.
     """
+    unknown = unknown_extensions(json)
+    if not unknown:
+        return []
     accessors, samplers = json_array(json, "accessors"), json_array(json, "animations")
     keys = {key for i in animations for key in sampled_accessors(samplers[i]["samplers"])}
     of_keys = views_of_all(accessors[number] for number in keys)
@@ -75,7 +78,7 @@ def extensions_naming_keys(json: Json, animations: Iterable[int]) -> list[str]:
     buffers = {json_array(json, "bufferViews")[view]["buffer"] for view in of_keys}
     return [
         place
-        for place, part in unknown_extensions(json)
+        for place, part in unknown
         if not named.isdisjoint(possible_indices(part)) or not buffers.isdisjoint(named_buffers(part))
     ]
 

@@ -23,9 +23,9 @@ class AnsweringPoints:
     point is listed at the lowest nodes where it is; a node that has several of these below has it several times.
     """
 
-    def __init__(self, points: PointMatrix, parents: Ints) -> None:
-        """parents: (N,), of all nodes. Weights are 0 or more."""
-        self._first, self._end = find_subtrees(parents)
+    def __init__(self, points: PointMatrix, parents: Ints, subtrees: tuple[Ints, Ints] | None = None) -> None:
+        """parents: (N,), of all nodes. subtrees: as of `find_subtrees`, if known. Weights are 0 or more."""
+        self._first, self._end = find_subtrees(parents) if subtrees is None else subtrees
         joints, weights = self._first[points.nodes][points.joints], points.factors[..., 3]  # (P, I), positions
         self._noticeable = _PointList(*_lowest_carried(joints, weights, self._first, self._end, parents))
         point, influence = np.nonzero(weights > 0)

@@ -113,7 +113,7 @@ def build_context(
         world,
         points,
         tuple(surface for surface in found if len(surface.targets)),
-        AnsweringPoints(points, skeleton.parents),
+        AnsweringPoints(points, skeleton.parents, skeleton.subtrees()),
         unseen,
         bounds,
         policy,
