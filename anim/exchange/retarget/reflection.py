@@ -1,4 +1,4 @@
-"""Reflection of a character whose rest pose is that of the motion, mirrored as a whole by a node above its joints."""
+"""Reflection of a character that a node above its joints mirrors as a whole, unlike the figure of the motion."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from anim.arrays import Bools, Floats
 from anim.exchange.retarget.joint_matching import JointMatch
 from anim.exchange.retarget.rest_alignment import BUILD_TOLERANCE, fit_similarity
 from anim.model import Skeleton
@@ -18,16 +19,24 @@ QUATERNION_REFLECTION = np.array((1.0, -1.0, -1.0, 1.0))  # of a rotation betwee
 def match_handedness(source: Skeleton, target: Skeleton, matching: JointMatch) -> Skeleton:
     """Return the target reflected in world space if only then its rest pose is the source's; else the target.
 
+    If they differ in build: if one is mirrored by its transforms, and the reflected target is nearer to the source.
     Local transforms below the roots stay, so a clip of the reflected skeleton is one of the target: its motion is
     mirrored like the target. A target with a matched root is returned as it is.
     """
     pairs = np.array([*matching.pairs.items()], np.int64)
     if (target.parents[pairs[:, 1]] < 0).any():
         return target
-    points, others = rest_world(source)[pairs[:, 0], :, 3], rest_world(target)[pairs[:, 1], :, 3]
-    if fit_similarity(points, others).error <= BUILD_TOLERANCE:
+    own, others = rest_world(source)[pairs[:, 0]], rest_world(target)[pairs[:, 1]]
+    error = fit_similarity(own[:, :, 3], others[:, :, 3]).error
+    if error <= BUILD_TOLERANCE:
         return target
-    return _reflect(target) if fit_similarity(points, others * REFLECTION).error <= BUILD_TOLERANCE else target
+    reflected = fit_similarity(own[:, :, 3], others[:, :, 3] * REFLECTION).error
+    is_nearer = reflected < error and bool((_is_mirrored(own) != _is_mirrored(others)).all())
+    return _reflect(target) if reflected <= BUILD_TOLERANCE or is_nearer else target
+
+
+def _is_mirrored(world: Floats) -> Bools:
+    return np.asarray(np.linalg.det(world[..., :3]) < 0)
 
 
 def _reflect(skeleton: Skeleton) -> Skeleton:

@@ -24,7 +24,7 @@ def _motion() -> Clip:
     return clip(path, arm, elbow)
 
 
-def _below(scale: tuple[float, float, float], rotation: Floats) -> Skeleton:
+def _below(scale: tuple[float, float, float] | Floats, rotation: Floats, offsets: Floats = OFFSETS) -> Skeleton:
     """The figure below a node of a scale and a rotation; its nodes are one later."""
     names = ("wrap", *map(str, range(5)))
     parents = [-1, *(parent + 1 for parent in PARENTS)]
@@ -32,7 +32,7 @@ def _below(scale: tuple[float, float, float], rotation: Floats) -> Skeleton:
     rotations[0] = rotation
     scales = np.ones((6, 3))
     scales[0] = scale
-    return Skeleton(names, np.array(parents), np.concatenate(([[0.3, 0, -2]], OFFSETS)), rotations, scales)
+    return Skeleton(names, np.array(parents), np.concatenate(([[0.3, 0, -2]], offsets)), rotations, scales)
 
 
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (1, 1, -1), (2, -2, 2), (-1, -1, -1), (1, 1, 1), (-1, 1, -1)])
@@ -48,3 +48,18 @@ def test_a_mirrored_figure_keeps_the_local_motion(scale: tuple[float, float, flo
     dots = np.abs((expected.rotation * found.rotation[:, 1:]).sum(axis=-1))
     np.testing.assert_allclose(dots, 1.0, atol=1e-6)
     np.testing.assert_allclose(found.translation[:, 1:], expected.translation, atol=1e-5)
+
+
+@pytest.mark.parametrize(("scale", "angle"), [((-1, 1, 1), 0.0), ((-2, 2, 2), 0.0), ((-1, -1, -1), 180.0)])
+def test_a_mirrored_figure_of_another_build_moves_as_if_it_were_not(
+    scale: tuple[float, float, float], angle: float
+) -> None:
+    source = ImportedMotion(skeleton(PARENTS, translation=OFFSETS), _motion(), frozenset(), 1e-4)
+    other = OFFSETS * np.array([1.1, 0.9, 1.3, 1.2, 0.8])[:, None] + np.array((0.01, 0.02, -0.03))
+    size = abs(scale[0])
+    targets = [_below(size * np.ones(3), about("x", [0])[0], other), _below(scale, about("x", [angle])[0], other)]
+    clips = [apply_to_character(source, Scene(each, ()), aliases={}, nested=True).clip for each in targets]
+    expected, found = (sample_pose(each, moved, TIMES) for each, moved in zip(targets, clips, strict=True))
+    dots = np.abs((expected.rotation * found.rotation).sum(axis=-1))
+    np.testing.assert_allclose(dots[:, 1:], 1.0, atol=1e-6)
+    np.testing.assert_allclose(found.translation[:, 1:], expected.translation[:, 1:], atol=1e-5)
