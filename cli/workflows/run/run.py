@@ -217,7 +217,7 @@ class RecipeRun:
         if is_changed_since(path, self._began_ns):  # as by a worker that was ended after it had written
             words = "failed, but was written meanwhile"
         else:
-            words = "not written" + (", an older one stays" if os.path.lexists(path) else "")
+            words = "not written" + (", an older one stays" if os.path.isfile(path) else "")
         failed = f": {result.failed_step} failed on {job.input}" if result.failed_step else ""
         return f"{job.output}  {words}{failed}"
 
