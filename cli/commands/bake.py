@@ -99,7 +99,8 @@ def command(
 
     Vertices are in scene order, those of all scenes: nodes depth-first, primitives as in the file, vertices as in their
     accessors. Skinned meshes are in world space, and the transform of their own node is ignored. If there are several
-    clips, OUT must contain {clip}, which is replaced by the name of each; {mesh} in OUT writes a file per mesh.
+    clips, OUT must contain {clip}, which is replaced by the name of each; {mesh} in OUT writes a file per mesh. Folders
+    of such names are made.
 
     Skin weights are divided by their sum, as players do. A warning names methods that move a vertex farther from lbs
     than the model's size. For joints with non-uniform scale, tools define all methods except lbs differently: here each

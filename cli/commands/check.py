@@ -143,6 +143,7 @@ def command(
     without extension) and {subfolder}, the folders below those of match: against = "{subfolder}/{stem}.gltf" for
     match = "build/**". --budget-report only shows the values beside the limits: without it a limit that is exceeded is
     the error GA402, exit 6.
+    `run` checks its outputs with --check only.
     --format github prints annotations, sarif is for code scanning, junit for test reports, md for job summaries.
     """
     if explain is not None:

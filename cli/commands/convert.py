@@ -58,9 +58,9 @@ def command(
 
     USD (extra usd) has the skeletons, skins and morph targets as UsdSkel, materials as UsdPreviewSurface, and one clip,
     sampled at a frame rate and interpolated linearly; a .usdz contains its images, for phones and other programs. If
-    there are several clips, OUT must contain {clip}, or --clip selects one. Unskinned meshes below joints are bound to
-    the skeleton, so that all players move them. The stated error is that of the farthest
-    vertex, skinned by USD, at frames and keys and half-way between.
+    there are several clips, OUT must contain {clip}, or --clip selects one. Folders of such names are made. Unskinned
+    meshes below joints are bound to the skeleton, so that all players move them. The stated error is that of the
+    farthest vertex, skinned by USD, at frames and keys and half-way between.
     """
     reporter = text.Reporter(quiet)
     if fps is not None and fps <= 0:
@@ -81,8 +81,17 @@ def command(
                 raise UsageError(f"{name} applies to USD only (.usdz, .usdc, .usda)")
         _convert(input, output, embed=embed, dry_run=dry_run, reporter=reporter)
 
+    placeholders = ("clip",) if _is_usd(output) else ()
     return many_files.edit_named(
-        input, output, more or (), out, edit, reporter, dry_run=dry_run, check=_check_extension
+        input,
+        output,
+        more or (),
+        out,
+        edit,
+        reporter,
+        dry_run=dry_run,
+        check=_check_extension,
+        placeholders=placeholders,
     )
 
 
@@ -112,4 +121,5 @@ def _convert(input: str, output: str, *, embed: bool, dry_run: bool, reporter: t
     name = source.name if output == documents.PIPE else output
     reporter.info(
         f"{name}  {text.format_change(source.size, size)}, {text.format_duration(time.perf_counter() - began)}"
+        f"{text.DRY if dry_run else ''}"
     )

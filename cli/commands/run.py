@@ -21,6 +21,7 @@ from cli.text import Reporter, format_bytes
 from cli.workflows.run import cache as caching
 from cli.workflows.run import journal as journals
 from cli.workflows.run import outputs, own_files
+from cli.workflows.run.budgets import has_budget
 from cli.workflows.run.cluster import connect_cluster
 from cli.workflows.run.emit import SCRIPTS, readable_jobs
 from cli.workflows.run.job import Job
@@ -84,7 +85,10 @@ def command(
         typer.Option("--scheduler", metavar="ADDRESS", help="Use the workers of a dask scheduler: tcp://host:8786."),
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Check the outputs by the settings, as the command check does.")
+        bool,
+        typer.Option(
+            "--check", help="Then check the outputs by the rules and budgets of the settings: exit 6 on errors."
+        ),
     ] = False,
     emit: Annotated[
         Script | None,
@@ -102,7 +106,7 @@ def command(
         [[recipe]]
         name = "crowd"
         match = "crowd/**/*.glb"
-        steps = ["resample --fps 30", "loop --clip '*_loop'", "optimize --max-error 0.5mm"]
+        steps = ["resample --fps 30", "optimize --max-error 0.5mm"]
         out = "build/{path}"
 
     match, out and files named in steps are relative to the folder of the settings. out takes {path}, {folder}, {name}
@@ -111,7 +115,9 @@ def command(
 
     Results are kept by the content of the input and of the files that steps name, by the steps, and by the version of
     this tool: a second run makes nothing again. --resume continues a run that was interrupted, by its journal.
-    Files that fail are named, others are done; the exit code is the largest one.
+    Files that fail are named with their step, others are done; the exit code is the largest one. An older output of a
+    file that fails stays. A file without the clip or node that a step selects fails: a recipe of its own, above, can
+    leave that step out. Budgets are checked with --check only.
 
     A note names outputs of earlier runs that no recipe makes any more, as after an input was deleted. --delete-stale
     deletes them, unless they were changed since.
@@ -162,8 +168,12 @@ def command(
             report_stale(record, book, run.jobs, run.written, reporter, delete=delete_stale)
         else:
             record.save(run.written)
-    written = [os.path.relpath(book.folder / each) for each in run.written.inputs]
-    return max(code, _check(written, quiet=quiet)) if check else code
+    if check:
+        written = [os.path.relpath(book.folder / each) for each in run.written.inputs]
+        return max(code, _check(written, config, quiet=quiet))
+    if has_budget(book, run.written.inputs):
+        reporter.info(f"note: the budgets of {book.path.name} were not checked: `run --check` or `check` does that")
+    return code
 
 
 @contextmanager
@@ -202,8 +212,10 @@ def _prune(results: caching.ResultCache, limit: int, reporter: Reporter) -> None
         )
 
 
-def _check(outputs: Sequence[str], *, quiet: bool) -> int:
-    """Check files by the settings; the exit code."""
+def _check(outputs: Sequence[str], config: str | None, *, quiet: bool) -> int:
+    """Check files by the settings; the exit code. config: named settings, None for the nearest of each file."""
     from cli.commands import check
 
-    return errors.run_guarded(lambda: check.command(list(outputs), quiet=quiet)) if outputs else errors.DONE
+    if not outputs:
+        return errors.DONE
+    return errors.run_guarded(lambda: check.command(list(outputs), config=config, quiet=quiet))

@@ -104,17 +104,19 @@ def load(path: str, reading: ReadOptions, *, staged: cache_folders.StagedFolder 
             raise error.at(name, ": ") from None
 
 
-def check(path: str, ending: str | None = None, placeholders: Sequence[str] | None = ()) -> str:
+def check(
+    path: str, ending: str | None = None, placeholders: Sequence[str] | None = (), *, makes_folder: bool = False
+) -> str:
     """Return the file extension of the format of `path`: its own, or `ending`; ".npz" for "-" without one.
 
     Raises UsageError, before any work, if nothing can be written, the format is unknown, `ending` contradicts the
-    extension of the name, or a pipe can't take the format. placeholders: see `documents.check_file`.
+    extension of the name, or a pipe can't take the format. placeholders, makes_folder: see `documents.check_file`.
     """
     own = "" if path == documents.PIPE else suffix(path)
     if path == documents.PIPE:
         check_pipe("stdout", ending or ".npz")
     else:
-        documents.check_file(path, placeholders)
+        documents.check_file(path, placeholders, makes_folder=makes_folder)
     if ending and own in CACHE_FORMATS and own != ending:
         raise UsageError(
             f"{path}: the name says {own[1:]}, --format says {ending[1:]}",

@@ -34,7 +34,7 @@ from anim.gltf.validation.extensions import PHYSICS, unknown_required
 from anim.units import list_some
 from cli import tables
 from cli.errors import RefusedOutputError, UsageError
-from cli.io import command_files, output_names, stdout
+from cli.io import command_files, output_folders, output_names, stdout
 from cli.streams import locate, record_files, step_streams
 from cli.text import Reporter
 
@@ -215,10 +215,11 @@ def check_binary(path: str) -> None:
         check_file(path)
 
 
-def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
+def check_file(path: str, placeholders: Sequence[str] | None = (), *, makes_folder: bool = False) -> None:
     """Raise UsageError or OutputError, before any work, if no file can be written at `path`.
 
     placeholders: allowed in its name as {this}; None if they are replaced already: then braces are part of the name.
+    makes_folder: whether its folder is made when it is written, as it is for a name with placeholders.
     """
     if not path:
         raise UsageError("the output has an empty name")
@@ -231,8 +232,9 @@ def check_file(path: str, placeholders: Sequence[str] | None = ()) -> None:
         if path.endswith(("/", os.sep)):
             raise RefusedOutputError(f"{path}: there is no such folder (expected a file name)")
         if not target.parent.is_dir():
-            raise OutputError(f"{path}: there is no folder '{target.parent}'")
-        if target.is_file() or not target.exists():
+            is_filled_in = any(f"{{{each}}}" in path for each in placeholders or ())
+            output_folders.check_missing(path, target.parent, is_made=makes_folder or is_filled_in)
+        elif target.is_file() or not target.exists():
             from anim.files import atomic
 
             atomic.check_writable(Path(path))

@@ -27,8 +27,8 @@ Out = Annotated[
         "--out",
         "-o",
         metavar="NAME",
-        help="Output of each file, where all names are inputs, also folders and patterns: out/{path}, or {folder}, "
-        "{name}, {stem}.",
+        help="Output of each file, where all names are inputs, also folders and patterns: out/ or out/{path}, or "
+        "{folder}, {name}, {stem}. Its folders are made.",
     ),
 ]
 Clips = Annotated[

@@ -17,11 +17,15 @@ PLACEHOLDERS = ("mesh", "clip")
 
 @dataclass(frozen=True, slots=True)
 class BakeJob:
-    """An output file to write: indices of its meshes and of its clip; None for a file without clips."""
+    """An output file to write: indices of its meshes and of its clip; None for a file without clips.
+
+    makes_folder: whether its name was filled in, so that its folder is made.
+    """
 
     file: str
     group: int
     clip: int | None
+    makes_folder: bool
 
 
 MeshGroup = tuple[str, Sequence[int] | None]  # value of {mesh}, and the nodes of the meshes; None for all
@@ -62,19 +66,20 @@ def bake_jobs(
     rows = [{"mesh": groups[i][0], "clip": name} for i, name, _ in pairs]
     by_clip = "{clip}" in output
     files = output_names.expand(output, rows, [(clip or 0) if by_clip else i for i, _, clip in pairs])
+    is_filled_in = any(f"{{{each}}}" in output for each in PLACEHOLDERS)
     if len(files) > 1 or "{" in output:
-        _check_files(files, ending)
-    return [BakeJob(file, i, clip) for file, (i, _, clip) in zip(files, pairs, strict=True)]
+        _check_files(files, ending, makes_folder=is_filled_in)
+    return [BakeJob(file, i, clip, is_filled_in) for file, (i, _, clip) in zip(files, pairs, strict=True)]
 
 
-def _check_files(files: Sequence[str], ending: str) -> None:
+def _check_files(files: Sequence[str], ending: str, *, makes_folder: bool) -> None:
     """Raise UsageError or OutputError for a file that can't be written; of new ones the first of each folder tells."""
     checked: set[tuple[str, str]] = set()  # folders and file extensions of new files
     for file in files:
         key = os.path.dirname(file), os.path.splitext(file)[1]
         is_new = bool(file) and file != documents.PIPE and _is_missing(file)
         if not (is_new and key in checked):
-            cache_files.check(file, ending, placeholders=None)
+            cache_files.check(file, ending, placeholders=None, makes_folder=makes_folder)
         if is_new:
             checked.add(key)
 

@@ -21,6 +21,7 @@ from cli.errors import UsageError
 from cli.io import cache_files
 from cli.io.cache_files import CommitWith, SavedCache, commit_alone
 from cli.io.cache_folders import StagedFolder
+from cli.io.output_folders import make_folder
 from cli.options import caches
 from cli.progress import Progress
 from cli.reports import bake_notes
@@ -140,7 +141,8 @@ class BakeRun:
             return self._commit_with(staged)
 
         try:
-            saved = self._file_options.save(cache, job.file, source, commit_with)
+            with make_folder(job.file, needed=job.makes_folder and not self._file_options.dry_run):
+                saved = self._file_options.save(cache, job.file, source, commit_with)
         finally:
             progress.close()
         if measured is not None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import copy
+from itertools import islice
 from pathlib import Path
 
 from anim.check.checked_file import CheckedFile
@@ -23,6 +25,8 @@ from anim.measure.inspect.report import Facts
 from anim.operations.selection import Selection
 from cli.io import documents
 from cli.text import Reporter
+
+MAX_COMPARED_NAMES = 1000  # of a folder: each of many missing files is compared with all
 
 
 @contextmanager
@@ -55,13 +59,26 @@ def _missing_images(document: Document, folder: Path | None) -> Iterator[tuple[s
 
 
 def fault_of(path: str, error: AnimError) -> AnimError:
-    """Return the error of an unreadable file, without the file's name; one that isn't there can't be fixed."""
+    """Return the error of an unreadable file, without the file's name; of one that isn't there the name is wrong."""
     name = documents.called(path)
     fault = copy(error)
     fault.where = fault.where.removeprefix(name).removeprefix(": ")
     if path not in ("", documents.PIPE) and not os.path.lexists(path):
-        fault.help = "name another file"
+        fault.help = _name_advice(path)
     return fault
+
+
+def _name_advice(path: str) -> str:
+    """Advice on a name of no file: a similar one in its folder, if there is one."""
+    folder, name = os.path.split(path)
+    if not os.path.isdir(folder or "."):
+        return f"there is no folder '{folder}'"
+    with suppress(OSError):  # no permission
+        found = (each for each in sorted(os.listdir(folder or ".")) if each.lower().endswith(container.SUFFIXES))
+        stems = {Path(each).stem: each for each in islice(found, MAX_COMPARED_NAMES)}  # all have about the same ending
+        if near := difflib.get_close_matches(Path(name).stem, stems, n=1):
+            return f"did you mean '{stems[near[0]]}'?"
+    return "correct its name"
 
 
 def facts_of_unreadable(fault: AnimError) -> Facts:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import math
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -36,11 +38,12 @@ def find_table(folder: Path) -> tuple[Path, dict[str, Any]] | None:
 
 
 def read_table(path: str) -> dict[str, Any]:
-    """Return the settings in a file."""
+    """Return the settings in a file. Raises FormatError if there is none, UsageError if it has none."""
     table = _table(Path(path))
+    if table is None and not Path(path).exists():
+        raise FormatError(f"can't be read ({os.strerror(errno.ENOENT).lower()})", where=path)
     if table is None:
-        problem = "has no [tool.gltf-anim]" if Path(path).is_file() else "there is no such file"
-        raise UsageError(f"{path}: {problem}")
+        raise UsageError(f"{path}: has no [tool.gltf-anim]")
     return table
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from anim.errors import AnimError, not_written
+from anim.errors import AnimError
 from anim.units import plural
 from cli import errors
 from cli.errors import NoFileError, RefusedOutputError, UsageError
-from cli.io import command_files, documents, input_files, output_names
+from cli.io import command_files, documents, input_files, output_folders, output_names
 from cli.text import Reporter
 from cli.typer_options import name_options
 
@@ -34,25 +34,38 @@ def edit_named(
     *,
     dry_run: bool,
     check: Callable[[str], None] = documents.check_extension,
+    placeholders: Sequence[str] = (),
 ) -> int:
     """Run `edit` on IN and OUT, or with a pattern of outputs on all named files; return the exit code.
 
-    check: raises UsageError for the extension of an output.
+    check: raises UsageError for the extension of an output. placeholders: that `edit` replaces in OUT.
     """
     if pattern is None:
         if more:
             help = "the command takes IN and OUT; for more inputs name their outputs by --out"
             raise UsageError(f"got unexpected extra argument ({more[0]})", help=help)
         refuse_folder(input, help="all its files: -o 'out/{path}'")
-        if dry_run and output != documents.PIPE:  # here, since folders of --out are made when files are written
-            check(output)
-            documents.check_file(output, None)
-        edit(input, output)
+        with _advise_folder(output):
+            if dry_run and output != documents.PIPE:  # here, since folders of --out are made when files are written
+                check(output)
+                documents.check_file(output, placeholders)
+            edit(input, output)
         return errors.DONE
     if not pattern:
         raise UsageError("--out has an empty name")
     names = [input, *([] if output == documents.PIPE else [output]), *more]
     return edit_files(names, pattern, edit, reporter, dry_run=dry_run, check=check)
+
+
+@contextmanager
+def _advise_folder(output: str) -> Iterator[None]:
+    """Advise --out in the error for an output that is a folder, or named as one."""
+    try:
+        yield
+    except RefusedOutputError as error:
+        if os.path.isdir(output) or output.endswith(("/", os.sep)):
+            error.advise(f"for a file of the input's name in that folder: -o '{output.rstrip('/' + os.sep)}/'")
+        raise
 
 
 def refuse_folder(path: str, *, help: str) -> None:
@@ -81,7 +94,7 @@ def edit_files(
     for pair in pairs:
         try:
             command_files.check_names({"OUT": pair.output}, [pair.input])
-            with _make_folder(pair.output, needed=not dry_run):
+            with output_folders.make_folder(pair.output, needed=not dry_run):
                 edit(pair.input, pair.output)
         except AnimError as error:
             if isinstance(error, UsageError) and not isinstance(error, RefusedOutputError):  # of the options
@@ -136,22 +149,3 @@ def _is_output(found: input_files.FoundFile, pattern: str) -> bool:
     searched = Path(os.path.abspath(found.folder))
     inside = folder != searched and folder.is_relative_to(searched)
     return found.is_searched and inside and Path(os.path.abspath(found.path)).is_relative_to(folder)
-
-
-@contextmanager
-def _make_folder(path: str, *, needed: bool) -> Iterator[None]:
-    """Make the folder of a file if it is `needed`; remove what was made, while empty, if the file isn't written."""
-    folder = Path(path).parent
-    missing = [each for each in (folder, *folder.parents) if needed and not each.exists()]
-    try:
-        if needed:
-            folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise not_written(str(folder), error) from None
-    try:
-        yield
-    except BaseException:
-        with suppress(OSError):  # another file is there, or somebody else's
-            for each in missing:
-                each.rmdir()
-        raise

@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from pathlib import PurePath
 
+from anim.errors import NotFoundError
 from anim.measure.inspect.storage_cost import animation_bytes
 from anim.optimization.file_optimizer import FileOptimizer
 from anim.optimization.options import Request
@@ -29,8 +30,11 @@ def write_curve(
 ) -> None:
     """Search with one bound after another, report each size, and write the curve.
 
-    request: with the effort that the sizes are of. name: of the file, for the title.
+    request: with the effort that the sizes are of. name: of the file, for the title. Raises NotFoundError without
+    channels, whose size no bound would change.
     """
+    if not any(optimizer.clips[i].tracks for i in optimizer.chosen):
+        raise NotFoundError("has no animation, whose size the curve would show")
     check_diagonal(optimizer.scale)
     reporter.info(f"  sizes of --effort {request.effort}")
     points = []

@@ -20,6 +20,7 @@ from anim.units import plural
 from cli import text
 from cli.errors import UsageError
 from cli.io import cache_folders, documents, scenes
+from cli.io.output_folders import make_folder
 from cli.reports.bake_notes import VISIBLE_ERROR_PER_DIAGONAL
 from cli.text import Reporter
 from cli.workflows.bake_jobs import bake_jobs
@@ -51,7 +52,8 @@ def convert_to_usd(
         for job in jobs:
             played = Clip("", ()) if job.clip is None else found[job.clip]
             label = "" if job.clip is None else reader.clip_label(played.name, job.clip)
-            _convert((source, document, scene), played, job.file, fps, label, reporter, dry_run=dry_run)
+            with make_folder(job.file, needed=job.makes_folder and not dry_run):
+                _convert((source, document, scene), played, job.file, fps, label, reporter, dry_run=dry_run)
 
 
 def _check_one_clip(output: str, clips: Sequence[tuple[str, int]]) -> None:

@@ -141,6 +141,18 @@ def test_no_clip_is_the_rest_pose(call: Call, tmp_path: Path) -> None:
     assert np.load(tmp_path / "still.npz")["times"].tolist() == [0]
 
 
+def test_folders_of_names_with_clips_are_made(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    out = tmp_path / "{mesh}" / "{clip}"
+    assert call("bake", fixture("arm"), out / "a.npz", "--dry-run").code == 0
+    assert not list(tmp_path.glob("arm"))
+    assert call("bake", fixture("arm"), out / "a.npz").code == 0
+    found = tmp_path.rglob("*.npz")
+    assert sorted(path.relative_to(tmp_path).as_posix() for path in found) == ["arm/bend/a.npz", "arm/twist/a.npz"]
+    refused = call("bake", fixture("arm"), tmp_path / "new" / "{clip}.glb", "--fps", 20_000)
+    assert (refused.code, (tmp_path / "new").exists()) == (4, False)
+    assert "there is no folder" in refusal(call("bake", fixture("arm"), tmp_path / "new/a.npz", "--clip", "bend"), 3)
+
+
 def test_rigid_meshes_only_on_request(call: Call, fixture: Fixture, tmp_path: Path) -> None:
     source = fixture("interpolations")
     run = call("bake", source, tmp_path / "{clip}.npz")

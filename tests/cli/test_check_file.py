@@ -24,3 +24,15 @@ def test_a_folder_that_is_not_there_is_none_either(tmp_path: Path) -> None:
     """As a file that can't be read."""
     with pytest.raises(OutputError, match="there is no folder"):
         documents.check_file(str(tmp_path / "missing" / "out.glb"))
+
+
+def test_the_folder_of_a_name_that_is_filled_in_is_made_later(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    documents.check_file(str(tmp_path / "new" / "{clip}.npz"), ("clip",))
+    documents.check_file(str(tmp_path / "new" / "sub" / "walk.npz"), None, makes_folder=True)
+    with pytest.raises(OutputError, match="file' is no folder"):
+        documents.check_file(str(tmp_path / "file" / "{clip}.npz"), ("clip",))
+    with pytest.raises(OutputError, match="there is no folder") as error:
+        documents.check_file(str(tmp_path / "new" / "walk.npz"), ("clip",))
+    assert error.value.help.startswith("make it first")
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "file"]

@@ -97,6 +97,15 @@ def test_settings_are_a_short_regular_file(
     assert f"gltf-anim.toml: {words}" in refusal(call(command, "noop.glb", "--config", path), code)
 
 
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_named_settings_that_are_not_there_are_a_missing_file(command: str, folder: Path, call: Call) -> None:
+    refused = refusal(call(command, "noop.glb", "--config", "none.toml"), 3)
+    assert refused == "gltf-anim: none.toml: can't be read (no such file or directory)"
+    (folder / "pyproject.toml").write_text("[tool.other]\n")
+    refused = refusal(call(command, "noop.glb", "--config", "pyproject.toml"), 2)
+    assert refused == "gltf-anim: pyproject.toml: has no [tool.gltf-anim]"
+
+
 def test_two_settings_in_one_folder_are_refused(folder: Path, call: Call) -> None:
     (folder / "gltf-anim.toml").write_text("[check]\n")
     (folder / "pyproject.toml").write_text("[tool.gltf-anim]\n")

@@ -182,6 +182,7 @@ def test_a_dry_run_writes_nothing(call: Call, tmp_path: Path) -> None:
         run = call("convert", "-", out, "-n", stdin=built("arm"))
         assert (run.code, run.out) == (0, b"")
         assert " → " in run.err
+        assert run.err.endswith(" (dry run: nothing written)\n")
     assert list(tmp_path.iterdir()) == []
 
 

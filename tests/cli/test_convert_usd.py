@@ -29,12 +29,15 @@ def source(tmp_path: Path) -> Path:
 
 
 def test_a_file_per_clip(call: Call, fixture: Fixture, tmp_path: Path) -> None:
-    run = call("convert", fixture("arm"), tmp_path / "{clip}.usda", "--fps", "10")
+    folder = tmp_path / "new"  # made, as for all names that are filled in
+    assert call("convert", fixture("arm"), folder / "{clip}.usda", "--fps", "10", "--dry-run").code == 0
+    assert not folder.exists()
+    run = call("convert", fixture("arm"), folder / "{clip}.usda", "--fps", "10")
     assert run.code == 0
     assert "clip 'twist', 11 frames at 10 fps, max " in run.err
     for name in ("twist", "bend"):
-        assert findings(tmp_path / f"{name}.usda") == []
-    assert (tmp_path / "twist.usda").read_bytes() != (tmp_path / "bend.usda").read_bytes()
+        assert findings(folder / f"{name}.usda") == []
+    assert (folder / "twist.usda").read_bytes() != (folder / "bend.usda").read_bytes()
 
 
 def test_materials_and_images(call: Call, source: Path) -> None:

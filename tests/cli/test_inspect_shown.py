@@ -173,9 +173,16 @@ def test_severities_are_shown_as_fail_on_takes_them(call: Call, fixture: Fixture
 
 def test_a_file_that_is_not_there_is_not_to_be_fixed(call: Call, tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(built("arm"))
-    run = call("inspect", tmp_path / "a.glb", tmp_path / "lost.glb")
-    assert run.code == 3
-    assert "can't be read (no such file or directory); name another file\n" in run.text
+    problem = "can't be read (no such file or directory)"
+    for name, advice in (
+        ("lost.glb", "correct its name"),
+        ("ab.glb", "did you mean 'a.glb'?"),
+        ("lost/a.glb", f"there is no folder '{tmp_path / 'lost'}'"),
+    ):
+        run = call("inspect", tmp_path / "a.glb", tmp_path / name)
+        assert run.code == 3
+        assert f"{problem}; {advice}\n" in run.text
+        assert run.err == f"gltf-anim: {tmp_path / name}: {problem}\nhelp: {advice}\n"
 
 
 def test_folders_and_patterns_are_inspected(call: Call, tmp_path: Path) -> None:

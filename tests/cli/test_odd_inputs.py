@@ -13,7 +13,7 @@ import pytest
 from cli.io.output_names import expand
 from fixtures.broken.pieces import animated, buffered, text
 from tests.cli.conftest import Call, Find
-from tests.cli.running import ENVIRONMENT, Run, built, refusal, shell
+from tests.cli.running import ENVIRONMENT, Run, built, help_line, refusal, shell
 
 DIGITS = "9" * 5000
 BVH = """HIERARCHY
@@ -184,9 +184,14 @@ def test_names_of_clips_as_names_of_files(name: str, expected: str) -> None:
 
 
 def test_a_folder_that_is_not_there_is_no_file_name(call: Call, walk: Path, tmp_path: Path) -> None:
-    said = refusal(call("resample", walk, f"{tmp_path}/new/", "--fps", "4"), 2)
-    assert "there is no such folder" in said
+    run = call("resample", walk, f"{tmp_path}/new/", "--fps", "4")
+    assert "there is no such folder" in refusal(run, 2)
+    assert help_line(run) == f"for a file of the input's name in that folder: -o '{tmp_path}/new/'"
     assert list(tmp_path.iterdir()) == [walk]
+    assert call("resample", walk, "-o", f"{tmp_path}/new/", "--fps", "4").code == 0
+    run = call("resample", walk, tmp_path / "new", "--fps", "4")
+    assert "new: is a folder (expected a file name)" in refusal(run, 2)
+    assert help_line(run).endswith(f"-o '{tmp_path}/new/'")
 
 
 @pytest.mark.parametrize(

@@ -162,6 +162,13 @@ def test_a_curve_as_csv(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     assert (said[0], len(said) - 1) == ("  sizes of --effort fast", len(rows))
 
 
+def test_a_file_without_animation_has_no_curve(fixture: Fixture, tmp_path: Path, call: Call) -> None:
+    path = tmp_path / "curve.csv"
+    said = refusal(call("optimize", fixture("wall"), "--curve", path), 5)
+    assert said.endswith("wall.glb: has no animation, whose size the curve would show")
+    assert not path.exists()
+
+
 def test_a_curve_has_the_sizes_of_its_effort(fixture: Fixture, tmp_path: Path, call: Call) -> None:
     """They were those of a fast search, whatever was asked for: `optimize` then gave others."""
     sizes = {}

@@ -12,7 +12,7 @@ import pytest
 
 from tests.cli.conftest import Call, Fixture
 from tests.cli.running import built, refusal
-from tests.cli.running_recipes import STEPS, journal, statuses, write_crowd, write_recipe
+from tests.cli.running_recipes import STEPS, journal, write_crowd, write_recipe
 
 PLAIN = ("resample --fps 12",)
 
@@ -118,29 +118,6 @@ def test_buffers_of_an_input_count_for_the_cache(folder: Path, call: Call) -> No
     buffer.write_bytes(data)
     assert "1 file: 1 made" in call("run").err
     assert call("convert", "build/arm.gltf").product() == call("resample", "crowd/arm.gltf", "--fps", "12").product()
-
-
-def test_a_file_that_fails_is_named_and_the_rest_is_done(folder: Path, call: Call) -> None:
-    write_crowd(folder, hero="biped")
-    (folder / "crowd/bad.glb").write_bytes(b"no glTF")
-    write_recipe(folder, *PLAIN)
-    run = call("run")
-    assert run.code == 3
-    assert "gltf-anim: crowd/bad.glb: is no glTF" in run.err
-    assert "in step 1 of 1: resample" in run.err
-    assert "3 files: 2 made, 1 failed" in run.err
-    assert sorted(path.name for path in (folder / "build/crowd").iterdir()) == ["arm 1.glb", "hero.glb"]
-    assert statuses(folder)["crowd/bad.glb"] == "failed"
-
-
-def test_a_later_step_names_the_file_and_the_exit_code_is_the_largest(folder: Path, call: Call) -> None:
-    write_crowd(folder, hero="biped")
-    (folder / "crowd/bad.glb").write_bytes(b"no glTF")
-    write_recipe(folder, "resample --fps 12", "trim --to 0.5 --clip walk")
-    run = call("run")
-    assert run.code == 5
-    assert "gltf-anim: crowd/arm 1.glb: " in run.err
-    assert "in step 2 of 2: trim" in run.err
 
 
 def test_warnings_of_steps_are_shown_and_other_lines_with_verbose(folder: Path, call: Call) -> None:

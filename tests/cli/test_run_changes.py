@@ -12,6 +12,7 @@ import pytest
 
 from cli.workflows.run import job as jobs
 from cli.workflows.run import run as runs
+from cli.workflows.run import run_job
 from cli.workflows.run.cache import MAX_HASHED_BYTES, FileHashes
 from tests.cli.conftest import Call
 from tests.cli.running import built
@@ -61,7 +62,7 @@ def test_the_result_of_a_file_that_is_replaced_during_the_steps_is_not_kept(
 ) -> None:
     path = text_file / name
     data = flipped(path) if name.endswith("bin") else path.read_bytes().replace(b'"arm"', b'"leg"')
-    do_after(monkeypatch, jobs, "run_steps", lambda: replace(path, data))
+    do_after(monkeypatch, run_job, "run_steps", lambda: replace(path, data))
     assert "1 file: 1 made" in call("run").err
     old = (text_file / "build/arm.glb").read_bytes()
     assert "1 file: 1 made" in call("run", "--resume").err

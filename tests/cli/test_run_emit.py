@@ -172,3 +172,21 @@ def test_check_applies_the_rules_to_outputs(folder: Path, call: Call) -> None:
     run = call("run", "--check")
     assert run.code == 6
     assert "build/crowd/arm 1.glb: error GA402 over-budget" in run.err
+    assert "were not checked" not in run.err
+    (folder / "gltf-anim.toml").rename(folder / "other.toml")
+    assert call("run", "--check", "--config", "other.toml").code == 6
+
+
+def test_a_run_without_check_says_that_it_leaves_budgets_out(folder: Path, call: Call) -> None:
+    write_recipe(folder, "resample --fps 12")
+    settings = folder / "gltf-anim.toml"
+    recipe = settings.read_text()
+    settings.write_text(recipe + '[[budget]]\nmatch = "crowd/**"\nbytes = 1\n')
+    assert "were not checked" not in call("run").err  # it is for the inputs
+    settings.write_text(recipe + '[[budget]]\nmatch = "build/**"\nbytes = 1\n')
+    words = "note: the budgets of gltf-anim.toml were not checked: `run --check` or `check` does that\n"
+    assert call("run").err.endswith(words)
+    assert call("run", "-q").err == ""
+    settings.write_text(recipe + "[[budget]]\nbytes = 1\n")  # `check` would refuse it
+    run = call("run")
+    assert (run.code, "were not checked" in run.err) == (0, False)

@@ -10,7 +10,8 @@ import pytest
 
 from cli.workflows.run import own_files
 from cli.workflows.run import run as runs
-from cli.workflows.run.job import Job, JobResult, run_job
+from cli.workflows.run.job import Job, JobResult
+from cli.workflows.run.run_job import run_job
 from tests.cli.conftest import Call
 from tests.cli.running import built, refusal
 from tests.cli.running_recipes import statuses, write_crowd, write_recipe

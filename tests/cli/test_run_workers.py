@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.workflows.run.job import Job, JobResult, shorten
+from cli.workflows.run.job import Job, JobResult
+from cli.workflows.run.run_job import shorten
 from cli.workflows.run.workers import local_pool, run_jobs
 from tests.cli.conftest import Call
 from tests.cli.running import ENVIRONMENT, refusal, shell, started

@@ -1,12 +1,8 @@
-"""One file of a run: its steps in this process, from bytes to bytes, and the output."""
+"""One file of a run: its steps, its result, and its output."""
 
 from __future__ import annotations
 
-import bisect
-import itertools
 import os
-import shlex
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
@@ -16,26 +12,21 @@ import numpy as np
 
 from anim import __version__
 from anim.arrays import Bytes
-from anim.errors import AnimError, UnsupportedError, not_written
+from anim.errors import AnimError, not_written
 from anim.files import atomic, guard, resolver
-from anim.gltf.document import Document, json_array
-from anim.gltf.io import container, images
+from anim.gltf.document import Document
+from anim.gltf.io import container
 from anim.gltf.io.source import external_files, open_bytes, open_file, write_file
 from anim.gltf.io.text_form import restore_text_form
-from cli import errors, main
 from cli.io import command_files
-from cli.io.documents import PIPE
 from cli.reports import image_notes
-from cli.streams import StepStreams, use_streams
 from cli.text import Reporter
-from cli.workflows.run.cache import FileHashes, ResultCache, path_key
 from cli.workflows.run.output_stamps import OutputStamps, stamp_output
 from cli.workflows.run.places import check_output
-from cli.workflows.run.stamps import FileStatus, Stamp, stamp_files, stamp_of, stamp_read, status_of
+from cli.workflows.run.stamps import FileStatus, Stamp, stamp_files, stamp_of, stamp_read
 from cli.workflows.run.steps import EDITING, Step
 
 EMPTY: Bytes = np.empty(0, np.uint8)
-MAX_FIRST_BYTES, MAX_LAST_BYTES = 20_000, 10_000  # of messages, together half of a pipe's buffer
 
 
 @dataclass(frozen=True)
@@ -67,6 +58,7 @@ class JobResult:
     if one that was read was changed meanwhile, so that nobody knows which content the output is of. copies: images that
     were copied beside the output, by their paths from the folder of the settings. step_errors: the largest error that
     each step measured, with its name: "resample max 2.1 mm (0.1 %)". stamps: of the output, as soon as it was written.
+    failed_step: the one that failed, "step 2 of 3 (trim --to 1)"; "" if none did.
     """
 
     code: int
@@ -79,6 +71,7 @@ class JobResult:
     copies: tuple[str, ...] = ()
     step_errors: tuple[str, ...] = ()
     stamps: OutputStamps | None = None
+    failed_step: str = ""
 
 
 class WrittenOutput(NamedTuple):
@@ -88,90 +81,6 @@ class WrittenOutput(NamedTuple):
     files: Mapping[str, Stamp | None] | None = None
     copies: tuple[str, ...] = ()
     stamps: OutputStamps | None = None
-
-
-def run_job(job: Job) -> JobResult:
-    """Run the steps of a file, and write its output; errors are reported in the result."""
-    began, began_ns = time.perf_counter(), time.time_ns()
-    stamp = stamp_of(job.folder / job.input)
-    streams = StepStreams(job.input, EMPTY, job.folder)
-    written = WrittenOutput()
-    step_errors: list[str] = []
-
-    def work() -> int:
-        nonlocal written
-        _check_version(job.version)
-        code, files, product = run_steps(job, streams, step_errors)
-        if code == errors.DONE:
-            if job.cache is not None:
-                store(job, product, files, began_ns, step_errors)
-            written = write_output(job, product, files, began_ns)
-        return code
-
-    with use_streams(streams):
-        code = errors.run_guarded(work)
-    seconds = time.perf_counter() - began
-    size, others, copies, stamps = written
-    messages = shorten(streams.messages)
-    return JobResult(code, messages, size, stamp, seconds, input_size(job), others, copies, tuple(step_errors), stamps)
-
-
-def shorten(messages: Sequence[str]) -> tuple[str, ...]:
-    """Return the first and last of many messages: errors are the last.
-
-    They fit in the buffer of a pipe, so that a worker which is killed leaves none that is half written.
-    """
-    ends = list(itertools.accumulate(len(each.encode()) for each in messages))
-    if not ends or ends[-1] <= MAX_FIRST_BYTES + MAX_LAST_BYTES:
-        return tuple(messages)
-    first = bisect.bisect_right(ends, MAX_FIRST_BYTES)
-    last = bisect.bisect_left(ends, ends[-1] - MAX_LAST_BYTES) + 1
-    return (*messages[:first], f"… {last - first} more lines", *messages[last:])
-
-
-def _check_version(version: str) -> None:
-    if version != __version__:
-        raise UnsupportedError(f"the worker has version {__version__} of gltf-anim (expected {version})")
-
-
-def run_steps(job: Job, messages: StepStreams, step_errors: list[str]) -> tuple[int, list[Path], Bytes]:
-    """Run the steps; return the exit code, the files that were read, and the GLB that the last step wrote.
-
-    messages: streams that get the messages of all steps. step_errors: gets their errors, as in `JobResult`.
-    """
-    files: list[Path] = []
-    data = EMPTY
-    for number, step in enumerate(job.steps, 1):
-        streams = StepStreams(job.input, data, job.folder, job.cores, image_folder(job) if number > 1 else None)
-        with use_streams(streams):
-            code = main.run(step.words(argument_of(job.input) if number == 1 else PIPE))
-        messages.messages += streams.messages
-        files += streams.files
-        step_errors += [f"{step.label} {streams.error}"] if streams.error else []
-        if code != errors.DONE:
-            messages.messages.append(f"in step {number} of {len(job.steps)}: {shlex.join(step.words()[:1])}")
-            return code, files, EMPTY
-        data = np.frombuffer(b"".join(streams.output), np.uint8)
-    return errors.DONE, files, data
-
-
-def store(job: Job, product: Bytes, files: Sequence[Path], began_ns: int, step_errors: Sequence[str]) -> None:
-    """Keep the result in the cache, with the hashes of all files that were read besides the input.
-
-    Not if the input was changed since its key was made, or another file since the steps began, a time in ns: the result
-    may be that of other content.
-    """
-    hashes = FileHashes()
-    others = {os.path.relpath(path, job.folder): hashes.hash(str(path)) for path in files}
-    others.pop(os.path.normpath(job.input), None)
-    if status_of(job.folder / job.input) != job.status or stamp_read(job.folder, others, began_ns) is None:
-        return
-    named = {os.path.normpath(name) for step in job.steps for name in step.files}
-    key = job.key if named.issuperset(others) else path_key(job.key, job.input)
-    document = container.read(product)
-    is_plain = not any(images.external_uri(image) for image in json_array(document.json, "images"))
-    assert job.cache is not None
-    ResultCache(job.cache).store(key, product, others, is_plain=is_plain, step_errors=step_errors)
 
 
 def write_output(job: Job, product: Bytes, read: Iterable[str | Path], began_ns: int) -> WrittenOutput:

@@ -25,7 +25,6 @@ from cli.workflows.run.job import (
     WrittenOutput,
     input_size,
     is_text,
-    run_job,
     write_output,
 )
 from cli.workflows.run.journal import CACHED, DONE_BEFORE, FAILED, MADE, STATUSES, Journal, JournalEntry
@@ -33,9 +32,15 @@ from cli.workflows.run.order import group_jobs, keys_read
 from cli.workflows.run.output_stamps import OutputStamps, stamp_output
 from cli.workflows.run.outputs import WrittenFiles
 from cli.workflows.run.places import output_key
-from cli.workflows.run.stamps import stamp_of, stamp_read, status_of
+from cli.workflows.run.run_job import is_notice, run_job
+from cli.workflows.run.stamps import is_changed_since, stamp_of, stamp_read, status_of
 from cli.workflows.run.steps import Step
 from cli.workflows.run.workers import local_pool, run_jobs
+
+MISSING_HELP = (
+    "files without the clip or node that a step selects need a recipe of their own, above this one: "
+    "of two recipes with the same output the first counts"
+)
 
 
 @dataclass
@@ -61,7 +66,7 @@ class RecipeRun:
 
     def run(self) -> int:
         """Run all jobs; return the largest exit code."""
-        began = time.perf_counter()
+        began, self._began_ns = time.perf_counter(), time.time_ns()
         self._progress = Progress("", len(self.jobs), shown=not self.reporter.quiet)
         try:
             for group in group_jobs(self.jobs):
@@ -79,6 +84,8 @@ class RecipeRun:
         counts = [f"{self.counts[each]} {each}" for each in STATUSES if self.counts[each]]
         took = format_duration(time.perf_counter() - began)
         self.reporter.info(f"{plural(len(self.jobs), 'file')}: {', '.join(counts)}, {took}")
+        if errors.NOT_FOUND in (code for _, code in self._failed.values()):
+            self.reporter.info(f"help: {MISSING_HELP}")
         self.journal.write_line({"end": {**self.counts, "code": self.code}})
         return self.code
 
@@ -179,6 +186,7 @@ class RecipeRun:
         self.counts[status] += 1
         if status == FAILED:
             self._failed[output_key(job.output)] = job.output, result.code
+            result = replace(result, messages=(*result.messages, self._describe_failed(job, result)))
         else:
             self.written.add(job.output, job.input, result.stamps)
         self.code = max(self.code, result.code)
@@ -203,6 +211,16 @@ class RecipeRun:
             )
         )
 
+    def _describe_failed(self, job: Job, result: JobResult) -> str:
+        """Line on the output of a job that failed, which stays as it was before; and the step that failed."""
+        path = job.folder / job.output
+        if is_changed_since(path, self._began_ns):  # as by a worker that was ended after it had written
+            words = "failed, but was written meanwhile"
+        else:
+            words = "not written" + (", an older one stays" if os.path.isfile(path) else "")
+        failed = f": {result.failed_step} failed on {job.input}" if result.failed_step else ""
+        return f"{job.output}  {words}{failed}"
+
     def _report(self, job: Job, result: JobResult, status: str) -> None:
         """Report a file: errors, warnings and notes, and a line if it was made; with --verbose all lines of steps."""
         reporter = Reporter() if status == FAILED else self.reporter
@@ -214,8 +232,3 @@ class RecipeRun:
             sizes = format_change(result.input_size, result.size)
             took = f", {format_duration(result.seconds)}" if status == MADE else f" ({status})"
             reporter.info(f"{job.output}  {', '.join((sizes, *result.step_errors))}{took}")
-
-
-def is_notice(line: str) -> bool:
-    """Return whether a line of a step is a warning or a note."""
-    return line.startswith(("warning: ", "note: "))

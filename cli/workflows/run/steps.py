@@ -55,6 +55,11 @@ class Step:
         """The command, for messages."""
         return " ".join(self.command)
 
+    @property
+    def line(self) -> str:
+        """The step as a recipe has it."""
+        return shlex.join((*self.command, *self.options))
+
 
 def parse_step(line: str, *, is_first: bool) -> Step:
     """Return the step of a command line without files. Raises UsageError.

@@ -17,7 +17,8 @@ from anim.errors import UnsupportedError, is_out_of_memory
 from anim.files import signals
 from anim.worker_processes import Lifeline, follow_parent, open_lifeline
 from cli import errors
-from cli.workflows.run.job import Job, JobResult, run_job
+from cli.workflows.run.job import Job, JobResult
+from cli.workflows.run.run_job import run_job
 
 HELP = "fewer --jobs need less, and `ulimit -a` shows the limits"
 MAX_CLEAN_UP_S = 2.0  # of a worker, when the parent has ended
