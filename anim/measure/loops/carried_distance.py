@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise, starmap
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,6 +17,7 @@ from anim.sampling.world import world_by_node
 
 PARTS = ("translation", "rotation", "scale")
 MAX_MATRICES = 250_000  # nodes × changed nodes per block, each about 500 bytes
+MAX_BLOCK = 64  # changed nodes of a large skeleton: with more, most matrices are of nodes that don't move
 
 Differences: TypeAlias = Callable[[Ints], Floats]  # of matrices (J, F, 3, 4) of nodes (J,)
 
@@ -30,15 +32,29 @@ def carried_distances(skin: SkinMotion, ends: Sequence[Pose], clip: Ints, nodes:
         return np.zeros(len(nodes))
     size = max(MAX_MATRICES // len(skin.skeleton), 1)
     is_whole = int(np.bincount(clip).max()) <= size
+    starts = range(0, len(nodes), size) if is_whole else _block_starts(skin.skeleton, nodes)
     squares = []
-    for first in range(0, len(nodes), size):
-        block = slice(first, first + size)
+    for block in starmap(slice, pairwise([*starts, len(nodes)])):
         changed = _Changed(clip[block], nodes[block], roots[clip[block]])
         if is_whole:
             squares.append(_squares(skin.skeleton, ends, changed, skin.squares, skin.batch_size(1)))
         else:
             squares.append(_squares_of_part(skin, ends, changed))
     return np.asarray(np.sqrt(np.concatenate(squares)))
+
+
+def _block_starts(skeleton: Skeleton, nodes: Ints) -> list[int]:
+    """Starts of blocks of nodes (K,) of which each has few nodes below and above, or is one node."""
+    first, end = skeleton.subtrees()
+    related = (end - first + hierarchy.find_depths(skeleton.parents))[nodes].tolist()
+    starts, total = [0], 0
+    for i, count in enumerate(related):
+        total += count
+        length = i + 1 - starts[-1]
+        if length > 1 and (length > MAX_BLOCK or min(total, len(skeleton)) * length > MAX_MATRICES):
+            starts.append(i)
+            total = count
+    return starts
 
 
 class _Changed(NamedTuple):

@@ -21,6 +21,7 @@ FONT_SIZE = 14  # pixels of an em
 LINE = 19  # pixels from one line of text to the next
 BAR = 120, 8  # pixels of the heat's legend
 MAX_LINES = 3  # of a heading
+MAX_TITLE = 1024  # pixels; a picture is not made wider for a longer one
 ELLIPSIS = "..."  # in ASCII, which the font has
 SPACE = 40  # pixels between title and legend
 
@@ -83,13 +84,13 @@ def _count_fitting(text: str, pixels: int) -> int:
 
 
 def header_width(title: str, legend: str) -> int:
-    """Return the width in pixels of a title and a legend."""
-    return width(title) + (width(legend) + BAR[0] + SPACE if legend else 0)
+    """Return the width in pixels of a title, which is cut where it is long, and a legend."""
+    return width(_shorten(title, MAX_TITLE)) + (width(legend) + BAR[0] + SPACE if legend else 0)
 
 
 def write_header(image: Image, title: str, legend: str, *, left: int, top: int) -> None:
     """Write a title at the top left, and the legend of the heat map at the top right."""
-    write(image, title, left, top)
+    write(image, _shorten(title, MAX_TITLE), left, top)
     if not legend:
         return
     right = image.shape[1] - left - width(legend)

@@ -144,3 +144,13 @@ def test_headings_are_the_names_of_clips() -> None:
     assert [(each.heading, each.label) for each in rows] == [
         ("walk", "lbs"), ("walk", "dqs"), ("wave", "lbs"), ("wave", "dqs"),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("letters", [1000, 2_000_000])
+def test_a_long_title_makes_no_wide_picture(letters: int) -> None:
+    title = "Fox.glb " + "n" * letters
+    assert captions.MAX_TITLE / 2 < captions.header_width(title, "") <= captions.MAX_TITLE
+    image = np.full((60, 1200, 3), 255, np.uint8)
+    captions.write_header(image, title, "", left=10, top=10)
+    assert (image != 255).any()
+    assert (image[:, 10 + captions.MAX_TITLE :] == 255).all()
