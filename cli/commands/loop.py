@@ -124,7 +124,7 @@ class _Closing:
         self._poses: list[str] = []
 
     def __call__(self, clips: Clips, tracks: Tracks, scene: Callable[[], Scene]) -> Clips:
-        self._poses = [_label(each) for each in clips.values() if each.end <= each.start]
+        self._poses = [reader.clip_label(each.name, i) for i, each in clips.items() if each.end <= each.start]
         moving = {i: each for i, each in clips.items() if each.end > each.start}
         if not moving:
             return clips
@@ -136,7 +136,7 @@ class _Closing:
         for i, n in zip(numbers, first, strict=True):
             found, root = analyzed[n]
             if problem := _problem(found, self._blend):
-                self._problems.append(f"{_label(clips[i])} {problem}")
+                self._problems.append(f"{reader.clip_label(clips[i].name, i)} {problem}")
             elif numbers[n] < i:
                 new[i] = repeat_change(clips[i], every[n], new[numbers[n]])
             else:
@@ -157,10 +157,6 @@ class _Closing:
             raise UsageError(f"{self._path}: {'; '.join(listed)}", help=HELP)
         if self._poses:
             yield f"a single pose, without a loop to close: {list_some(self._poses)}"
-
-
-def _label(clip: Clip) -> str:
-    return f"clip '{clip.name}'" if clip.name else "a clip without a name"
 
 
 def _analyzed(skin: SkinMotion, clips: Sequence[Clip], fps: float | None) -> list[tuple[Loop, int]]:

@@ -155,7 +155,7 @@ def _check(kind: TrackFormat, unit: Unit, frame: AxesConvention, scale: float | 
 def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
     chosen = Selection(globs or ()).chosen_clips([each.name for each in clips])
     if len(chosen) != 1:
-        names = ", ".join(f"'{reader.clip_name(clips[i].name, i)}'" for i in chosen[:8])
+        names = ", ".join(reader.quote_clip(clips[i].name, i) for i in chosen[:8])
         raise NotFoundError(
             f"{plural(len(chosen), 'clip')} to choose from (expected one)",
             help=f"--clip one of {names}" if chosen else "",

@@ -13,7 +13,6 @@ from anim.gltf.document import Document
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.reader import clip_name
 from anim.gltf.validation.animation_storage import badly_stored
 from anim.gltf.writing import writer
 from anim.measure.continuous_bound.clip_groups import largest_error_of, worst_proof
@@ -280,6 +279,6 @@ def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
     spans = {i: [format_span(*each) for each in pair] for i, pair in ends.items() if pair[0] != pair[1]}
     changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
     if len(changed) <= MAX_LISTED_CLIPS:
-        return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())
+        return ", ".join(f"{reader.quote_clip(before[i].name, i)} {words}" for i, words in changed.items())
     sums = (sum(clips[i].end for i in changed) for clips in (before, after))
     return f"{plural(len(changed), 'clip')} {' → '.join(map(format_time, sums))} in all"
