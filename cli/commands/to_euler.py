@@ -116,7 +116,7 @@ def command(
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     reporter.info(
-        f"{name}  {text.format_change(source.size, len(data))}, {plural(len(motion.nodes), 'node')}, "
+        f"{name}  {text.format_bytes(len(data))}, {plural(len(motion.nodes), 'node')}, "
         f"{words}{text.format_duration(time.perf_counter() - began)}{ending}"
     )
 
