@@ -47,6 +47,8 @@ class Comparison:
 
     springs: (S, 2) pairs of points to draw; with one spring the motion is drawn in phase space, without as points.
     test_equation: "oscillator", x″ = −ω²x, or "drag", x″ = −r x′, whose r·h is `omega_h`: a name in GAINS.
+    about: the system in words, if it is that of a simulation, whose method is `method`: the name of one of the runs, or
+    words for another one.
     """
 
     runs: list[IntegratorRun]
@@ -54,6 +56,8 @@ class Comparison:
     step: float
     springs: Ints
     test_equation: str = "oscillator"
+    about: str = ""
+    method: str = ""
 
 
 def compare_integrators(

@@ -82,10 +82,10 @@ def command(
 ) -> None:
     """Measure the difference between the motion of two files, in metres on the surface.
 
-    Clips and nodes are matched by name, then by order. A's vertices are moved by the nodes of both files, so that
-    quantized, merged or reordered meshes do not count as motion. Nodes that move no vertex are measured at six points
-    around them (--shell). Errors are measured at all keys of both files, half-way between, and at 120 samples per
-    second.
+    Clips and nodes are matched by name, then by order, with a warning if no name is common. A's vertices are moved by
+    the nodes of both files, so that quantized, merged or reordered meshes do not count as motion. Nodes that move no
+    vertex are measured at six points around them (--shell). Errors are measured at all keys of both files, half-way
+    between, and at 120 samples per second.
 
     Per clip, worst first: the largest error with joint, vertex and time; p99 and mean over all vertices; the largest
     rotation error of a node in world space; the largest error of speed (jitter), of morph weights, and of pointers (as
@@ -161,8 +161,8 @@ def command(
     report = DiffReport(
         one.file, other.file, found, *common_names(one, other), who, fps, radius, is_measured_at(one.scene), alone
     )
-    if report.are_strangers:
-        reporter.warn(f"{diff_report.STRANGERS}: are they two versions of one thing?")
+    if report.warning:
+        reporter.warn(report.warning)
     for words in ambiguous_clips(one.file, other.file, chosen):
         reporter.warn(words)
     for words in () if report.are_strangers else found.warnings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from enum import StrEnum
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -21,6 +22,7 @@ from cli import errors, units
 from cli.errors import UsageError
 from cli.io import documents
 from cli.options import common
+from cli.reports.fit_notes import describe_easing
 from cli.text import Reporter
 from cli.workflows import many_files
 from cli.workflows.edit_clips import Clips, edit_clips
@@ -83,7 +85,8 @@ def command(
     the path changes. --per range eases the whole range from --from to --to once, through all its keys.
 
     Cubic easings (smoothstep, quad, cubic, back, bounce, hermite) are written exactly as CUBICSPLINE, others with as
-    few keys as --tolerance allows; steps() becomes STEP. STEP tracks keep their values; only --per range moves their
+    few keys as --tolerance allows, and rotations always within --angle-tolerance: the last line states both where they
+    apply. steps() becomes STEP. STEP tracks keep their values; only --per range moves their
     keys in time. Easings that overshoot exceed the values of the keys; the effect on scale and weights is reported.
 
     Easings are those of easings.net, but expo and elastic are scaled to be exactly 0 at the start and 1 at the end. The
@@ -139,6 +142,13 @@ def command(
             dry_run=dry_run,
             measure=False,
             notes=lambda before, after: _notes(before, after, easing, per),
+            state=partial(
+                describe_easing,
+                is_cubic=easing.exact is not None,
+                tolerance=share,
+                angle_tolerance=angle,
+                range_of="track" if per is Per.RANGE else "key interval",
+            ),
         )
 
     return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)

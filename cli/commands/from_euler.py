@@ -151,7 +151,8 @@ def command(
         bones = converted.skeleton
         bodies = split_by_root(bones, *stick_mesh(bones, converted.ends)) if mesh is Mesh.STICKS else []
         document = authoring.build_document(bones, [converted.clip], bodies)
-        before, size = len(data), _write(made, document, output, None, format, reporter, dry_run=dry_run)
+        size = _write(made, document, output, None, format, reporter, dry_run=dry_run)
+        written = text.format_bytes(size)
     else:
         names = pairs(alias)
         with documents.source(onto, reporter) as character:
@@ -160,14 +161,14 @@ def command(
             made = named(made, character.document, name=name, replaced=taken)
             casting = CharacterOptions(names, floor, bind_time, fail_unmatched, taken)
             made, document = put_on_character(made, character, casting, reporter)
-            before = character.size
             size = _write(made, document, output, character, format, reporter, dry_run=dry_run)
+            written = text.format_change(character.size, size)
         if not dry_run:
             image_notes.report(document, character, output, reporter)
     for line in from_euler_report.lines(made, verbose=verbose):
         reporter.info(line)
     parts = [
-        f"{called if output == documents.PIPE else output}  {text.format_change(before, size)}",
+        f"{called if output == documents.PIPE else output}  {written}",
         from_euler_report.counts(made),
     ]
     ending = " (dry run: nothing written)" if dry_run else ""

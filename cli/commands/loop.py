@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -21,19 +20,17 @@ from anim.model import Clip, Scene
 from anim.operations.close_loop import close_loop
 from anim.operations.selection import Selection
 from anim.units import list_some, plural
-from cli import tables
 from cli.errors import UsageError
 from cli.io import documents, scenes
 from cli.options import common
 from cli.options.common import Format
-from cli.reports import json_report
-from cli.text import Reporter, format_length, format_speed
+from cli.reports import loop_report
+from cli.reports.loop_report import LoopReport, joint_names
+from cli.text import Reporter, format_length
 from cli.workflows import many_files
 from cli.workflows.edit_clips import Clips, Tracks, edit_together
 
-SCHEMA = 1
 HELP = "--blend S closes the loop over the last S seconds; --clip selects clips"
-MAX_LISTED_JOINTS = 3  # joints that a table or a message lists
 MAX_LISTED_PROBLEMS = 3  # clips that can't be closed in a message; with more it would be cut
 
 
@@ -59,6 +56,14 @@ def command(
             "--shortest", metavar="S", help="For --find: minimum duration in seconds (default: half of the clip)."
         ),
     ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            "--fps",
+            metavar="N",
+            help='Frames per second of the clips, for "frame step" and a missing frame (default: by their keys).',
+        ),
+    ] = None,
     format: common.Report = Format.TEXT,
     clip: common.Clips = None,
     dry_run: common.DryRun = False,
@@ -75,6 +80,10 @@ def command(
     hardly visible. "seconds" are those of the first and the last key, "at" is the node with the largest gap, or the
     joints that are open, and "root motion" is the distance between both ends of the path of the root.
 
+    "at fps" is the frame rate of "frame step" and of the frame that may be missing. It is derived from the keys, and is
+    30 if these are not regular: optimize, resample and other edits change it. --fps states the clips' own rate, so that
+    figures before and after an edit compare.
+
     With OUT, a clip that is open by one frame gets the missing frame, in which root motion continues. --blend closes
     any gap of value and velocity but those of the path of a root that travels, which stays as it is, its height too;
     if only some joints are open, it changes only these. --find lists the time ranges that loop best, for trim, and
@@ -83,13 +92,13 @@ def command(
     selection = Selection(clip or ())
     reporter = Reporter(quiet, verbose)
     if output is None and blend is None:
-        _report(input, selection, reporter, find=find, shortest=shortest, format=format)
+        _report(input, selection, reporter, find=find, shortest=shortest, fps=fps, format=format)
         return
     if find:
         raise UsageError("--find only reports", help="cut the range with trim --from … --to …")
     many_files.refuse_folder(input, help='a recipe closes loops of many files: steps = ["loop"], then gltf-anim run')
     documents.check_output(output or documents.PIPE, dry_run=dry_run)
-    closing_of = _Closing(blend, input)
+    closing_of = _Closing(blend, input, fps)
     edit_together(
         input,
         output or documents.PIPE,
@@ -104,29 +113,30 @@ def command(
 class _Closing:
     """Closes clips, all analyzed together. blend: s, None to add a missing frame only. path: of the input.
 
-    Clips that can't be closed are collected, so that one error names them before anything is written.
+    fps: of the clips, None for that of their keys. Clips that can't be closed are collected, so that one error names
+    them before anything is written.
     """
 
-    def __init__(self, blend: float | None, path: str) -> None:
-        self._blend = blend
+    def __init__(self, blend: float | None, path: str, fps: float | None) -> None:
+        self._blend, self._fps = blend, fps
         self._path = "stdin" if path == documents.PIPE else path
         self._problems: list[str] = []
         self._poses: list[str] = []
 
     def __call__(self, clips: Clips, tracks: Tracks, scene: Callable[[], Scene]) -> Clips:
-        self._poses = [_label(each) for each in clips.values() if each.end <= each.start]
+        self._poses = [reader.clip_label(each.name, i) for i, each in clips.items() if each.end <= each.start]
         moving = {i: each for i, each in clips.items() if each.end > each.start}
         if not moving:
             return clips
         numbers, every, skin = list(moving), list(moving.values()), SkinMotion(scene())
         first = first_equal([(each,) for each in every])
         distinct = sorted(set(first))
-        analyzed = dict(zip(distinct, _analyzed(skin, [every[n] for n in distinct]), strict=True))
+        analyzed = dict(zip(distinct, _analyzed(skin, [every[n] for n in distinct], self._fps), strict=True))
         new: dict[int, Clip] = dict(clips)
         for i, n in zip(numbers, first, strict=True):
             found, root = analyzed[n]
             if problem := _problem(found, self._blend):
-                self._problems.append(f"{_label(clips[i])} {problem}")
+                self._problems.append(f"{reader.clip_label(clips[i].name, i)} {problem}")
             elif numbers[n] < i:
                 new[i] = repeat_change(clips[i], every[n], new[numbers[n]])
             else:
@@ -149,14 +159,10 @@ class _Closing:
             yield f"a single pose, without a loop to close: {list_some(self._poses)}"
 
 
-def _label(clip: Clip) -> str:
-    return f"clip '{clip.name}'" if clip.name else "a clip without a name"
-
-
-def _analyzed(skin: SkinMotion, clips: Sequence[Clip]) -> list[tuple[Loop, int]]:
+def _analyzed(skin: SkinMotion, clips: Sequence[Clip], fps: float | None) -> list[tuple[Loop, int]]:
     """The analysis of each clip, and its root, −1 for none."""
     roots = [root_motion_node(skin.skeleton, each) for each in clips]
-    return list(zip(analyze_loops(skin, clips, roots), roots, strict=True))
+    return list(zip(analyze_loops(skin, clips, roots, fps=fps), roots, strict=True))
 
 
 def _problem(found: Loop, blend: float | None) -> str:
@@ -164,12 +170,20 @@ def _problem(found: Loop, blend: float | None) -> str:
     if blend is not None or found.kind in (LoopKind.OPEN_BY_ONE_FRAME, LoopKind.CLOSED):
         return ""
     if found.kind is LoopKind.CLOSED_EXCEPT:
-        return f"is closed except at {_names(found, quote=True)}: its end is {format_length(found.seam)} from its start"
+        joints = joint_names(found, quote=True)
+        return f"is closed except at {joints}: its end is {format_length(found.seam)} from its start"
     return f"is not a loop: its end is {format_length(found.seam)} from its start at '{found.node}'"
 
 
 def _report(
-    path: str, selection: Selection, reporter: Reporter, *, find: bool, shortest: float | None, format: Format
+    path: str,
+    selection: Selection,
+    reporter: Reporter,
+    *,
+    find: bool,
+    shortest: float | None,
+    fps: float | None,
+    format: Format,
 ) -> None:
     with documents.source(path, reporter) as source:
         clips = reader.clips(source.document)
@@ -177,28 +191,32 @@ def _report(
         skin = _skin(source, reporter)
         first = first_equal([(clips[i],) for i in chosen])
         distinct = sorted(set(first))
-        analyzed = dict(zip(distinct, _loops(skin, [clips[chosen[n]] for n in distinct], find, shortest), strict=True))
+        analyzed = dict(
+            zip(distinct, _loops(skin, [clips[chosen[n]] for n in distinct], find, shortest, fps), strict=True)
+        )
         loops = [analyzed[n] for n in first]
     names = [reader.clip_name(clips[i].name, i) for i in chosen]
     rows = [(name, each) for name, found in zip(names, loops, strict=True) for each in found]
     parts = list(zip(chosen, loops, strict=True)) if find else []
     judged = [] if find else [(i, each) for i, (each,) in zip(chosen, loops, strict=True)]
-    advised, notes = list(recommend(judged)), list(_no_better(clips, parts)) if clips else ["no clips"]
+    notes = list(_no_better(clips, parts)) if clips else ["no clips"]
+    report = LoopReport(rows, list(recommend(judged, fps=fps)), notes, skin.is_skin)
     if format is Format.JSON:
-        documents.write_text(_json(rows, advised, notes, on_skin=skin.is_skin, warnings=reporter.warnings))
+        documents.write_text(loop_report.as_json(report, warnings=reporter.warnings))
     elif not reporter.quiet:
-        lines = [f"  {line}\n" for line in (*advised, *notes)]
-        documents.write_text(
-            "\n".join(filter(None, (_text(rows, on_skin=skin.is_skin) if rows else "", "".join(lines))))
-        )
+        documents.write_text(loop_report.text(report))
 
 
-def _loops(skin: SkinMotion, clips: Sequence[Clip], find: bool, shortest: float | None) -> list[list[Loop]]:
+def _loops(
+    skin: SkinMotion, clips: Sequence[Clip], find: bool, shortest: float | None, fps: float | None
+) -> list[list[Loop]]:
     """The analysis of each clip as a whole, or of its best ranges."""
     if not find:
-        return [[found] for found, _ in _analyzed(skin, clips)]
+        return [[found] for found, _ in _analyzed(skin, clips, fps)]
     roots = (root_motion_node(skin.skeleton, each) for each in clips)
-    return [best_ranges(skin, each, root=i, shortest=shortest or 0.0) for each, i in zip(clips, roots, strict=True)]
+    return [
+        best_ranges(skin, each, root=i, shortest=shortest or 0.0, fps=fps) for each, i in zip(clips, roots, strict=True)
+    ]
 
 
 def _no_better(clips: Sequence[Clip], found: list[tuple[int, list[Loop]]]) -> Iterator[str]:
@@ -230,56 +248,3 @@ def _skin(source: Source, reporter: Reporter) -> SkinMotion:
     except AnimError as error:
         scenes.warn_of_nodes(error, "skin", reporter)
         return SkinMotion(Scene(reader.skeleton(source.document), ()))
-
-
-def _text(rows: list[tuple[str, Loop]], *, on_skin: bool) -> str:
-    header = [
-        "clip",
-        "seconds",
-        "kind",
-        "loop gap" if on_skin else "loop gap (nodes)",
-        "frame step",
-        "velocity gap",
-        "velocity step",
-        "at",
-        "root motion",
-    ]
-    cells: list[list[tables.Cell]] = [
-        [
-            name,
-            f"{each.start:.4g}–{each.end:.4g}",
-            str(each.kind),
-            format_length(each.seam),
-            format_length(each.inside.largest),
-            format_speed(each.speed_seam),
-            format_speed(each.inside.speed),
-            _names(each) if each.kind is LoopKind.CLOSED_EXCEPT else each.node,
-            format_length(each.travel) if each.travel else "",
-        ]
-        for name, each in rows
-    ]
-    return tables.text(header, cells, left=3, indent="")
-
-
-def _names(found: Loop, *, quote: bool = False) -> str:
-    """Names of the joints that stay open, the largest loop gap first."""
-    names = [f"'{each.joint}'" if quote else each.joint for each in found.joints]
-    return list_some(names, MAX_LISTED_JOINTS)
-
-
-def _json(
-    rows: list[tuple[str, Loop]], advised: list[str], notes: list[str], *, on_skin: bool, warnings: list[str]
-) -> str:
-    units = {"start": "start_s", "end": "end_s", "seam": "seam_m", "speed_seam": "speed_seam_m_per_s"}
-    units |= {"frame": "frame_motion_m", "travel": "travel_m", "fps": "frame_rate_fps", "joints": "open_joints"}
-    loops = []
-    for name, each in rows:
-        facts = asdict(each) | {"joints": [{"joint": one.joint, "gap_m": one.gap} for one in each.joints]}
-        facts["largest_frame_motion_m"] = each.inside.largest
-        facts["typical_frame_motion_m"] = each.inside.typical
-        facts["largest_speed_change_m_per_s"] = each.inside.speed
-        del facts["inside"]
-        loops.append({"clip": name, **{units.get(key, key): value for key, value in facts.items()}})
-    report: dict[str, object] = {"schema": SCHEMA, "measured_on": "skin" if on_skin else "nodes", "loops": loops}
-    report |= {"advice": advised, "notes": notes, "warnings": warnings}
-    return json_report.dump(report)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 import typer
 
+from anim.curves.easing.function import Easing
 from anim.curves.easing.table import parse
 from anim.model import Clip
 from anim.operations.retime import retime as retimed
 from anim.operations.selection import Selection
-from anim.operations.time_warp import warp
+from anim.operations.time_warp import ANGLE_TOLERANCE_RAD, TOLERANCE, warp
 from cli.errors import UsageError
 from cli.options import common
+from cli.reports.fit_notes import describe_easing
 from cli.text import Reporter
 from cli.workflows import many_files
-from cli.workflows.edit_clips import check_clips, edit_clips
+from cli.workflows.edit_clips import Clips, check_clips, edit_clips
 
 
 def command(
@@ -69,6 +73,19 @@ def command(
         )
 
     def edit(input: str, output: str) -> None:
-        edit_clips(input, output, selection, change, reporter, dry_run=dry_run, measure=False)
+        edit_clips(input, output, selection, change, reporter, dry_run=dry_run, measure=False, state=_stated(easing))
 
     return many_files.edit_named(input, output, more or (), out, edit, reporter, dry_run=dry_run)
+
+
+def _stated(easing: Easing | None) -> Callable[[Clips, Clips], str]:
+    """The words of the summary on the tolerances of --warp."""
+    if easing is None:
+        return lambda before, after: ""
+    return partial(
+        describe_easing,
+        is_cubic=easing.exact is not None,
+        tolerance=TOLERANCE,
+        angle_tolerance=ANGLE_TOLERANCE_RAD,
+        range_of="track",
+    )

@@ -116,7 +116,7 @@ def command(
     name = source.name if output == documents.PIPE else output
     ending = " (dry run: nothing written)" if dry_run else ""
     reporter.info(
-        f"{name}  {text.format_change(source.size, len(data))}, {plural(len(motion.nodes), 'node')}, "
+        f"{name}  {text.format_bytes(len(data))}, {plural(len(motion.nodes), 'node')}, "
         f"{words}{text.format_duration(time.perf_counter() - began)}{ending}"
     )
 
@@ -155,7 +155,7 @@ def _check(kind: TrackFormat, unit: Unit, frame: AxesConvention, scale: float | 
 def _only(clips: tuple[Clip, ...], globs: list[str] | None) -> Clip:
     chosen = Selection(globs or ()).chosen_clips([each.name for each in clips])
     if len(chosen) != 1:
-        names = ", ".join(f"'{reader.clip_name(clips[i].name, i)}'" for i in chosen[:8])
+        names = ", ".join(reader.quote_clip(clips[i].name, i) for i in chosen[:8])
         raise NotFoundError(
             f"{plural(len(chosen), 'clip')} to choose from (expected one)",
             help=f"--clip one of {names}" if chosen else "",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from anim.gltf.reading.reader import quote_clip
 from anim.units import list_some, plural
 from cli import text
 from cli.io import documents
@@ -51,7 +52,9 @@ def summarize_files(done: Sequence[BakedFile], method: str) -> str:
     file = "stdout" if done[0].file == documents.PIPE else done[0].file
     name = file if len(done) == 1 else f"{_count(done)}, {file} …"
     frames = plural(sum(each.frames for each in done), "frame")
-    of = f" of '{done[0].clip}'" if len({each.number for each in done}) == 1 and done[0].clip else ""
+    first = done[0]
+    is_one = len({each.number for each in done}) == 1 and first.number is not None
+    of = f" of {quote_clip(first.clip, first.number or 0)}" if is_one else ""
     parts = [f"{name}  {text.format_bytes(sum(each.saved.size for each in done))}", f"{method}{of}"]
     vertices = sorted({each.vertices for each in done})
     parts.append(f"{frames} of {' to '.join(map(str, dict.fromkeys((vertices[0], vertices[-1]))))} vertices")

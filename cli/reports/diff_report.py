@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from anim.gltf.reading.reader import clip_name
+from anim.gltf.reading.reader import clip_name, quote_clip
 from anim.measure.compare.diff import END_TOLERANCE_S, ClipDiff, Diff
 from anim.measure.error.statistics import Peak
 from anim.measure.inspect.storage_cost import StorageCost
@@ -18,8 +18,8 @@ from cli.reports.error_place import describe_place
 from cli.text import format_change, format_length, format_speed
 
 SCHEMA = 1
+IN_BOTH = "has the same name in both files"
 MAX_LISTED_NAMES = 5  # listed names that only one file has
-STRANGERS = "no clip and no node has the same name in both files"
 HEADER = (
     *("clip", "joint", "vertex", "time s", "max error", "% of size", "p99", "mean"),
     *("angle", "speed", "weights", "pointers", "end s"),
@@ -38,9 +38,9 @@ class File(NamedTuple):
 class DiffReport(NamedTuple):
     """Comparison of two files, and its settings.
 
-    nodes_by_name: number of nodes of the old file with a node of the same name in the new one. are_named: whether
-    both files have names. player: of both files, or two, "spec,nlerp". fps: frames per second of the grid. shell: m.
-    measured_at: "surface" or, where the old file has no vertices, "nodes".
+    nodes_by_name: number of nodes of the old file with a node of the same name in the new one. have_node_names:
+    whether nodes of the old file have names, and of the new one. player: of both files, or two, "spec,nlerp".
+    fps: frames per second of the grid. shell: m. measured_at: "surface" or, for an old file without vertices, "nodes".
     max_vertex_error: m, of vertices alone, where the largest error is around a node that moves none; else None.
     """
 
@@ -48,7 +48,7 @@ class DiffReport(NamedTuple):
     new: File
     diff: Diff
     nodes_by_name: int
-    are_named: bool
+    have_node_names: tuple[bool, bool]
     player: str
     fps: float
     shell: float
@@ -62,20 +62,39 @@ class DiffReport(NamedTuple):
 
     @property
     def are_strangers(self) -> bool:
-        """Return whether both files have names and none in common: nodes and clips are matched by order alone."""
-        return self.are_named and not self.clips_by_name and not self.nodes_by_name
+        """Return whether both files have names and none in common: probably two different things."""
+        clips = self.old.clips, self.new.clips
+        are_named = all(has_names or any(names) for has_names, names in zip(self.have_node_names, clips, strict=True))
+        return are_named and self._are_clips_in_order and self._are_nodes_in_order
+
+    @property
+    def warning(self) -> str:
+        """The warning that clips or nodes are compared in their order, though there are names; "" for none."""
+        clips, nodes = self._are_clips_in_order, self._are_nodes_in_order
+        if clips and nodes:
+            doubt = "; are they two versions of one thing?" if self.are_strangers else ""
+            return f"no clip and no node {IN_BOTH}: both are compared in their order{doubt}"
+        if nodes:
+            return f"no node {IN_BOTH}: nodes are compared in their order"
+        has_choice = max(len(self.old.clips), len(self.new.clips)) > 1
+        return f"no clip {IN_BOTH}: clips are compared in their order" if clips and has_choice else ""
+
+    @property
+    def _are_clips_in_order(self) -> bool:
+        names = {*self.old.clips}, {*self.new.clips}
+        return bool(self.diff.clips) and any(names[0] | names[1]) and not any(names[0] & names[1])
+
+    @property
+    def _are_nodes_in_order(self) -> bool:
+        return bool(self.diff.clips) and any(self.have_node_names) and not self.nodes_by_name
 
 
 def text(found: DiffReport) -> str:
-    """Return a row per clip, the worst first, then the contents of only one file, and a summary line.
-
-    The first line tells if the files have no name in common.
-    """
-    head = f"{STRANGERS}: clips and nodes are compared in their order\n" if found.are_strangers else ""
+    """Return a row per clip, the worst first, then the contents of only one file, and a summary line."""
     clips = found.diff.clips
     rows = [_row(each, found.diff.diagonal) for each in clips]
     table = tables.text([*HEADER, "tracks"], rows, left=2, indent="") + "\n" if rows else ""
-    return head + table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
+    return table + "".join(f"{line}\n" for line in (*_alone(found), *_summary(found)))
 
 
 def as_json(found: DiffReport, *, warnings: Sequence[str] = ()) -> str:
@@ -112,21 +131,21 @@ def worst(found: DiffReport) -> str:
         return "0 mm"
     vertex = f", vertex {error.vertex}" if error.vertex >= 0 else ""
     percent = f" ({_share(_percent(error.max_error, found.diff.diagonal))} %)" if found.diff.diagonal else ""
-    clip = clip_name(each.name, each.old)
-    return f"{format_length(error.max_error)}{percent} in '{clip}' {describe_place(error)}{vertex}, {error.time:.3f} s"
+    clip = quote_clip(each.name, each.old)
+    return f"{format_length(error.max_error)}{percent} in {clip} {describe_place(error)}{vertex}, {error.time:.3f} s"
 
 
 def without_length(found: DiffReport) -> str:
     """Return the first difference that is no distance, "" if none: "pointers 83 % of range at /… in 'Run'"."""
     for each in found.diff.clips:
         error, weight = each.error, each.statistics.weight
-        clip = clip_name(each.name, each.old)
+        clip = quote_clip(each.name, each.old)
         if error.max_pointer_error:
-            return f"pointers {_share(100 * error.max_pointer_error)} % of range at {error.pointer} in '{clip}'"
+            return f"pointers {_share(100 * error.max_pointer_error)} % of range at {error.pointer} in {clip}"
         if weight.size:
-            return f"morph weights {_share(weight.size)} at '{weight.joint}' in '{clip}'"
+            return f"morph weights {_share(weight.size)} at '{weight.joint}' in {clip}"
         if each.unmeasured:
-            return f"{each.unmeasured[0]} is not measured in '{clip}'"
+            return f"{each.unmeasured[0]} is not measured in {clip}"
     return ""
 
 
@@ -158,14 +177,14 @@ def _alone(found: DiffReport) -> list[str]:
     """Lines on clips, tracks and nodes of only one of the files."""
     diff, lines = found.diff, []
     for names, which in (
-        ([clip_name(found.old.clips[i], i) for i in diff.missing_clips], f"clip only in {found.old.name}"),
-        ([clip_name(found.new.clips[i], i) for i in diff.added_clips], f"clip only in {found.new.name}"),
-        (diff.missing_nodes, f"node only in {found.old.name}"),
-        (diff.added_nodes, f"node only in {found.new.name}"),
+        ([quote_clip(found.old.clips[i], i) for i in diff.missing_clips], f"clip only in {found.old.name}"),
+        ([quote_clip(found.new.clips[i], i) for i in diff.added_clips], f"clip only in {found.new.name}"),
+        ([f"'{name}'" for name in diff.missing_nodes], f"node only in {found.old.name}"),
+        ([f"'{name}'" for name in diff.added_nodes], f"node only in {found.new.name}"),
     ):
         if names:
             noun, rest = which.split(" ", 1)
-            listed = list_some([f"'{tables.escape_control(name)}'" for name in names], MAX_LISTED_NAMES)
+            listed = list_some([tables.escape_control(name) for name in names], MAX_LISTED_NAMES)
             lines.append(f"{plural(len(names), noun)} {rest}: {listed}")
     if not diff.by_vertex:
         lines.append("meshes differ: the first file's vertices, carried by the second one's joints")

@@ -46,6 +46,7 @@ class ConversionReport:
     onto: CharacterClip | None = None
     character: Skeleton | None = None
     is_guess: bool = False
+    replaced: int | None = None
 
 
 def warnings(made: ConversionReport) -> Iterator[str]:
@@ -53,7 +54,7 @@ def warnings(made: ConversionReport) -> Iterator[str]:
     yield from made.motion.notes
     if made.is_guess:
         yield f"scale: {made.scale_words}"
-    yield from _leading_pose(made.converted, is_alone=made.onto is None)
+    yield from _leading_pose(made)
     if made.onto is not None and made.onto.num_bound:
         verb = "rests" if made.onto.num_bound == 1 else "rest"
         moved = f"{plural(made.onto.num_bound, 'joint')} of the character {verb} elsewhere than its skin was bound"
@@ -112,17 +113,15 @@ def as_json(made: ConversionReport, *, warnings: Sequence[str]) -> str:
     return json_report.dump(content)
 
 
-def _leading_pose(converted: ImportedMotion, *, is_alone: bool) -> Iterator[str]:
-    """Words on a first frame apart from the motion, of a recording; adaptive keys aren't frames.
-
-    is_alone: whether no other clips will be in the file.
-    """
+def _leading_pose(made: ConversionReport) -> Iterator[str]:
+    """Words on a first frame apart from the motion, of a recording; adaptive keys aren't frames."""
+    converted = made.converted
     found = None if converted.tolerance is not None else find_leading_pose(converted.clip)
     if found is not None:
         joints = plural(found.num_joints, "joint")
         jump = f"{joints} jump to the next one, '{converted.skeleton.names[found.node]}' by {degrees(found.angle):.0f}°"
-        name = "" if is_alone else converted.clip.name
-        chosen = f" --clip {shlex.quote(glob.escape(name))}" if name else ""
+        name = glob.escape(converted.clip.name) or f"#{made.replaced}"
+        chosen = f" --clip {shlex.quote(name)}" if made.onto is not None else ""  # else it is the only clip
         advice = f"`trim --from {np.float32(found.end)!s} --rebase{chosen}` removes it from the clip"
         yield f"the first frame is a pose apart from the motion: {jump} ({advice})"
 

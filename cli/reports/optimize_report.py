@@ -150,7 +150,7 @@ def _worst_words(about: OptimizeReport) -> str:
     if not verdicts:
         return "no clip"
     number = max(verdicts, key=lambda i: verdicts[i].error.max_error)
-    clip = f" in '{reader.clip_name(about.clips[number].name, number)}'" if len(about.clips) > 1 else ""
+    clip = f" in {reader.quote_clip(about.clips[number].name, number)}" if len(about.clips) > 1 else ""
     words = _error_words(verdicts[number], about, clip)
     return words + optimize_bound.summary(verdicts.values(), about.request, about.scale)
 

@@ -74,16 +74,17 @@ def put_on_character(
     made = replace(made, onto=done, character=scene.skeleton)
     if casting.replaced is not None:
         old = reader.clips(document)[casting.replaced]
+        called = reader.quote_clip(old.name, casting.replaced)
         stay, num_gone = retained_tracks(old, done)
         if stay:
-            reporter.info(f"note: {plural(len(stay), 'track')} of '{old.name}' that the motion has no node for stay")
+            reporter.info(f"note: {plural(len(stay), 'track')} of {called} that the motion has no node for stay")
         if num_gone:
-            what = f"{plural(num_gone, 'track')} of '{old.name}' that the motion has no node for"
+            what = f"{plural(num_gone, 'track')} of {called} that the motion has no node for"
             reporter.warn(f"{what} go with it: it is another figure's motion")
         scaled = scaled_ancestors(done, stay, scene.skeleton)
         if scaled:
             names = ", ".join(scene.skeleton.label(node) for node in scaled)
-            reporter.warn(f"the motion lacks the scale of {names} in '{old.name}': joints below get their rest size")
+            reporter.warn(f"the motion lacks the scale of {names} in {called}: joints below get their rest size")
         clip = add_retained_tracks(done, stay, scene.skeleton)
         return made, writer.replace_clips(document, {casting.replaced: clip})
     return made, authoring.add_clips(document, [done.clip])
@@ -116,7 +117,7 @@ def named(made: ConversionReport, document: Document, *, name: str | None, repla
     """
     names = reader.names(document)
     if replaced is not None:
-        return _called(made, names[replaced])
+        return _called(replace(made, replaced=replaced), names[replaced])
     own = made.converted.clip.name
     if own not in names:
         return made
@@ -136,7 +137,7 @@ def index_of(replaced: str | None, document: Document) -> int | None:
     names = reader.names(document)
     found = Selection((replaced,)).chosen_clips(names)
     if len(found) > 1:
-        listed = list_some([f"#{i} '{names[i]}'" for i in found])
+        listed = list_some([f"#{i} '{names[i]}'" if names[i] else f"#{i}" for i in found])
         raise NotFoundError(f"--replace '{replaced}' means {len(found)} clips (expected one)", help=f"one of {listed}")
     return found[0]
 
@@ -144,7 +145,8 @@ def index_of(replaced: str | None, document: Document) -> int | None:
 def check_name(name: str | None, replaced: int | None, document: Document) -> None:
     """Raise UsageError for a replaced clip together with another name."""
     if name is not None and replaced is not None and name != (own := reader.names(document)[replaced]):
-        words = f"--replace keeps the name of the clip, '{own}' (got --name '{name}')"
+        kept = f", '{own}'" if own else ": it has none"
+        words = f"--replace keeps the name of the clip{kept} (got --name '{name}')"
         raise UsageError(words, help="leave --name out")
 
 

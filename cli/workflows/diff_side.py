@@ -10,7 +10,7 @@ from anim.gltf.document import Document
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
 from anim.gltf.reading.scene_nodes import is_default_scene_empty
-from anim.measure.compare.name_matching import ambiguous_names, match_by_name
+from anim.measure.compare.name_matching import ambiguous_names, match_by_letters
 from anim.measure.inspect.storage_cost import StorageCost, storage_costs
 from anim.measure.inspect.stored_bytes import stored_bytes
 from anim.model import Clip, Scene
@@ -50,11 +50,10 @@ def open_side(path: str, reporter: Reporter) -> DiffSide:
         )
 
 
-def common_names(one: DiffSide, other: DiffSide) -> tuple[int, bool]:
-    """Return the number of nodes of one whose name exists in the other, and whether both files have node names."""
+def common_names(one: DiffSide, other: DiffSide) -> tuple[int, tuple[bool, bool]]:
+    """Return the number of nodes of one whose name exists in the other, and whether nodes of each have names."""
     nodes = one.scene.skeleton.names, other.scene.skeleton.names
-    are_named = all(any((*side.file.clips, *names)) for side, names in zip((one, other), nodes, strict=True))
-    return int((match_by_name(*nodes) >= 0).sum()), are_named
+    return int((match_by_letters(*nodes) >= 0).sum()), (any(nodes[0]), any(nodes[1]))
 
 
 def ambiguous_clips(one: File, other: File, chosen: Sequence[int] | None) -> Iterator[str]:

@@ -13,7 +13,6 @@ from anim.gltf.document import Document
 from anim.gltf.io.source import Source
 from anim.gltf.reading import reader
 from anim.gltf.reading.accessors import Accessors
-from anim.gltf.reading.reader import clip_name
 from anim.gltf.validation.animation_storage import badly_stored
 from anim.gltf.writing import writer
 from anim.measure.continuous_bound.clip_groups import largest_error_of, worst_proof
@@ -48,7 +47,7 @@ class EditResult(NamedTuple):
     """Clips of a file before and after, by index, and the largest error on the surface.
 
     at_nodes: whether only nodes were measured, because the surface could not be read. around: a larger error around a
-    node that moves no vertex, such as a socket.
+    node that moves no vertex, such as a socket. stated: words for the summary.
     """
 
     before: dict[int, Clip]
@@ -57,6 +56,7 @@ class EditResult(NamedTuple):
     diagonal: float
     at_nodes: bool = False
     around: Proof | None = None
+    stated: str = ""
 
 
 def edit_clips(
@@ -70,6 +70,7 @@ def edit_clips(
     measure: bool = True,
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
     advise: Callable[[Clip, int], str] = lambda clip, index: "",
+    state: Callable[[Clips, Clips], str] = lambda before, after: "",
 ) -> None:
     """Change the selected clips of one file, one by one, and write it; report the result in one line on stderr.
 
@@ -78,7 +79,7 @@ def edit_clips(
     advise: gets a clip that can't be changed, and its index, and returns the help of the error, or "".
     """
     many = partial(_change_each, change, advise)
-    edit_together(path, output, selection, many, reporter, dry_run=dry_run, measure=measure, notes=notes)
+    edit_together(path, output, selection, many, reporter, dry_run=dry_run, measure=measure, notes=notes, state=state)
 
 
 def _change_each(
@@ -109,13 +110,15 @@ def edit_together(
     dry_run: bool,
     measure: bool = True,
     notes: Callable[[Clips, Clips], Iterable[str]] = lambda before, after: (),
+    state: Callable[[Clips, Clips], str] = lambda before, after: "",
 ) -> None:
     """Change the selected clips of one file in one call and write it; report the result in one line on stderr.
 
     change: gets the clips, a function for the indices of their selected tracks, and a reader of the scene; returns the
     new clips.
     measure: compare the motion of the written file with that of the input, on the surface.
-    notes: gets the changed clips, before and after, and returns notes for the user, a line each.
+    notes: gets the changed clips, before and after, and returns notes for the user, a line each. state: gets the same,
+    and returns words for the summary, such as a tolerance.
     """
     began = time.perf_counter()
     if not dry_run:
@@ -161,6 +164,7 @@ def edit_together(
     if edited.worst is not None:
         largest = max(filter(None, (edited.worst, edited.around)), key=_max_error)
         streams.state_error(_length(largest, edited.diagonal) + describe_pointers(edited.worst.error))
+    edited = edited._replace(stated=state({i: clips[i] for i in new}, new))
     reporter.info(_summary(name, source.size, size, edited, time.perf_counter() - began, dry_run=dry_run))
 
 
@@ -242,7 +246,7 @@ def _changed_non_unit_keys(before: Clip, after: Clip) -> int:
 def _summary(name: str, before: int, after: int, edited: EditResult, seconds: float, *, dry_run: bool) -> str:
     keys = [sum(_keys(clip) for clip in clips.values()) for clips in (edited.before, edited.after)]
     parts = [f"{name}  {text.format_change(before, after)}", f"{keys[0]} → {keys[1]} keys"]
-    parts += filter(None, [clip_lengths(edited.before, edited.after)])
+    parts += filter(None, [clip_lengths(edited.before, edited.after), edited.stated])
     if edited.worst is not None:
         parts.append(_error(edited.worst, edited.diagonal) + (" (nodes only)" if edited.at_nodes else ""))
     if edited.around is not None:
@@ -280,6 +284,6 @@ def clip_lengths(before: Mapping[int, Clip], after: Mapping[int, Clip]) -> str:
     spans = {i: [format_span(*each) for each in pair] for i, pair in ends.items() if pair[0] != pair[1]}
     changed = {i: f"{was} → {now}" for i, (was, now) in spans.items() if was != now}
     if len(changed) <= MAX_LISTED_CLIPS:
-        return ", ".join(f"'{clip_name(before[i].name, i)}' {words}" for i, words in changed.items())
+        return ", ".join(f"{reader.quote_clip(before[i].name, i)} {words}" for i, words in changed.items())
     sums = (sum(clips[i].end for i in changed) for clips in (before, after))
     return f"{plural(len(changed), 'clip')} {' → '.join(map(format_time, sums))} in all"

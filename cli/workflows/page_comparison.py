@@ -62,7 +62,8 @@ def describe_worst(file: PageFile, content: PageContent) -> str:
     if not worst.max:
         return words
     where = f" at '{worst.joint}'" if worst.joint else ""
-    return f"{words} in '{reader.clip_name(reader.names(file.document)[index], index)}'{where}, {worst.time:.3f} s"
+    clip = reader.quote_clip(reader.names(file.document)[index], index)
+    return f"{words} in {clip}{where}, {worst.time:.3f} s"
 
 
 def _played(clips: tuple[Sequence[Clip], Sequence[Clip]], clip: str | None) -> int:

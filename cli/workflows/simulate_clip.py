@@ -100,7 +100,7 @@ def note_chosen_clip(document: Document, glob: str | None, reporter: Reporter) -
         reporter.info(f"note: {first} drives the simulation, the first of {len(names)} clips (--clip: another)")
 
 
-def note_own_clip(name: str, driver: Clip, reporter: Reporter) -> None:
-    """Note that the motion is in a clip of its own, which players don't show first."""
-    first = f"clip '{driver.name}'" if driver.name else "the driving clip"
+def note_own_clip(name: str, driver: Clip, number: int, reporter: Reporter) -> None:
+    """Note that the motion is in a clip of its own, which players don't show first. number: index of the driver."""
+    first = reader.clip_label(driver.name, number)
     reporter.info(f"note: the motion is clip '{name}'; players begin with another: --merge adds it to {first}")

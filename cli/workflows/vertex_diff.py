@@ -107,12 +107,12 @@ def _motions(
             raise RangeError(f"{one.name} and {other.name} have {counts} (expected the same)")
         return "", cache_motion(one.cache), cache_motion(other.cache)
     if other.cache is not None and one.document is not None:
-        clip = _clip(one, one.document, globs)
-        return clip.name, *pair_with_cache(one.document, one.scene_of(), clip, other.cache)
+        label, clip = _clip(one, one.document, globs)
+        return label, *pair_with_cache(one.document, one.scene_of(), clip, other.cache)
     if one.cache is not None and other.document is not None:
-        clip = _clip(other, other.document, globs)
+        label, clip = _clip(other, other.document, globs)
         second, first = pair_with_cache(other.document, other.scene_of(), clip, one.cache)
-        return clip.name, first, second
+        return label, first, second
     assert one.document is not None
     assert other.document is not None
     if mesh_pairs.is_bake_of(one.scene_of(), other.scene_of(), len(reader.names(other.document))):
@@ -130,18 +130,18 @@ def _of_documents(
     """Name of the clip, and the motions of a source and of its bake, which has one clip."""
     (played,) = reader.clips(baked[1])[:1] or (Clip("", ()),)
     same = [f"#{i}" for i, name in enumerate(reader.names(source[1])) if name == played.name]  # the name can be empty
-    clip = _clip(*source, globs or same)
+    label, clip = _clip(*source, globs or same)
     sides = ((source[0].scene_of(), clip), (baked[0].scene_of(), played))
     first, second, missing = pair_documents(*sides)
     if missing:
         reporter.warn(f"{baked[0].name}: has no mesh like {list_some(missing)}")
-    return clip.name, first, second
+    return label, first, second
 
 
-def _clip(side: ComparedFile, document: Document, globs: Sequence[str]) -> Clip:
-    """The selected clip of a document, or its only one."""
+def _clip(side: ComparedFile, document: Document, globs: Sequence[str]) -> tuple[str, Clip]:
+    """The selected clip of a document, or its only one, with its name for tables, "" for none."""
     clips = reader.clips(document)
     chosen = Selection(globs).chosen_clips(reader.names(document)) if globs else range(len(clips))
     if len(chosen) > 1:
         raise UsageError(f"{side.name} has {len(clips)} clips, a cache has one", help="choose one with --clip")
-    return clips[chosen[0]] if chosen else Clip("", ())
+    return (reader.clip_name(clips[chosen[0]].name, chosen[0]), clips[chosen[0]]) if chosen else ("", Clip("", ()))

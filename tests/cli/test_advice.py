@@ -44,6 +44,19 @@ def follow(call: Call, path: Path) -> set[str]:
     return followed
 
 
+@pytest.mark.parametrize("options", [(), ("--param", "GA102.angle=10")])
+def test_keys_for_nlerp_are_added_at_once(options: tuple[str, ...], call: Call, tmp_path: Path) -> None:
+    """A step of 170° was advised another half as long, and after that one a quarter."""
+    path = tmp_path / "in.glb"
+    turn = clips.track("rotation", [0, 0.5, 0.51, 1.3], clips.about("x", [0, 170, 10, 40]), clips.LINEAR, node=0)
+    path.write_bytes(glb_of(writer.replace_clips(opened(built("biped")), {0: clips.clip(turn)})))
+    check = ("check", path, "--select", "GA102", *options, "--format", "json")
+    (finding,) = [each for each in call(*check).json["findings"] if each["pointer"].startswith("/animations/0")]
+    line = finding["advice"].split("gltf-anim ")[1]
+    assert call(*(str(path) if word == "FILE" else word for word in shlex.split(line))).code == 0
+    assert call(*check).json["findings"] == []
+
+
 def test_advice_for_a_player_runs(call: Call, tmp_path: Path) -> None:
     source, output = tmp_path / "in.glb", tmp_path / "out.glb"
     source.write_bytes(built("interpolations"))

@@ -31,16 +31,27 @@ def test_strangers_are_called_that_before_anything_else(tmp_path: Path, call: Ca
     run = call("diff", *paths)
     problem = "no clip and no node has the same name in both files"
     assert run.code == 0
-    assert run.err == f"warning: {problem}: are they two versions of one thing?\n"
-    assert run.text.startswith(f"{problem}: ")
+    assert run.err == f"warning: {problem}: both are compared in their order; are they two versions of one thing?\n"
+    assert problem not in run.text, "twice in a terminal"
     assert call("diff", *paths, "-q").err == run.err
     found = call("diff", *paths, "--format", "json").json
     assert (found["clips_matched_by_name"], found["nodes_matched_by_name"]) == (0, 0)
     assert call("diff", *paths, "--fail-above", "1%").code == 6
 
 
-@pytest.mark.parametrize(("clips", "nodes"), [(True, False), (False, True), (True, True)])
-def test_one_name_in_common_makes_no_strangers(clips: bool, nodes: bool, tmp_path: Path, call: Call) -> None:
+BY_ORDER = "has the same name in both files: {} are compared in their order"
+
+
+@pytest.mark.parametrize(
+    ("clips", "nodes", "words"),
+    [
+        (True, False, f"no node {BY_ORDER.format('nodes')}"),
+        (False, True, f"no clip {BY_ORDER.format('clips')}"),
+        (True, True, ""),
+    ],
+)
+def test_what_has_no_name_in_common_is_named(clips: bool, nodes: bool, words: str, tmp_path: Path, call: Call) -> None:
+    """Only files without any common name had a warning: "walk" is a name that strangers share."""
     document = opened_fixture("biped")
     names = {"animations": clips, "nodes": nodes}
     other = {
@@ -49,22 +60,48 @@ def test_one_name_in_common_makes_no_strangers(clips: bool, nodes: bool, tmp_pat
     }
     renamed = replace(document, json={**document.json, **other})
     run = call("diff", saved(tmp_path / "a.glb", document), saved(tmp_path / "b.glb", renamed), "--format", "json")
-    assert run.err == ""
+    assert run.err == (f"warning: {words}\n" if words else "")
     found = run.json
+    assert found["warnings"] == [words] * bool(words)
     assert found["clips_matched_by_name"] == 3 * clips
     assert found["nodes_matched_by_name"] == len(document.json["nodes"]) * nodes
     assert found["max_error_m"] == 0  # by order they are the same all the same
 
 
-def test_files_without_names_are_no_strangers(tmp_path: Path, call: Call) -> None:
+def test_single_clips_with_two_names_need_no_warning(tmp_path: Path, call: Call) -> None:
+    """No other match is possible, and the table has both names."""
+    document = opened_fixture("biped")
+    paths = [
+        saved(
+            tmp_path / f"{name}.glb",
+            replace(document, json={**document.json, "animations": [{**document.json["animations"][0], "name": name}]}),
+        )
+        for name in ("a", "b")
+    ]
+    run = call("diff", *paths)
+    assert run.err == ""
+    assert "\na → b " in run.text
+
+
+def test_nodes_whose_names_share_their_letters_are_matched_by_name(tmp_path: Path, call: Call) -> None:
+    document = opened_fixture("biped")
+    dotted = [{**each, "name": each["name"].replace("_", ".") + "."} for each in document.json["nodes"]]
+    other = saved(tmp_path / "b.glb", replace(document, json={**document.json, "nodes": dotted}))
+    run = call("diff", saved(tmp_path / "a.glb", document), other, "--format", "json")
+    assert run.err == ""
+    assert run.json["nodes_matched_by_name"] == len(dotted)
+
+
+def test_files_without_names_are_compared_in_their_order(tmp_path: Path, call: Call) -> None:
     document = opened_fixture("biped")
     bare = {key: [{**each, "name": ""} for each in document.json[key]] for key in ("animations", "nodes")}
     nameless = saved(tmp_path / "b.glb", replace(document, json={**document.json, **bare}))
-    assert "\nwave → #1 " in call("diff", saved(tmp_path / "a.glb", document), nameless).text
-    for other in (nameless, saved(tmp_path / "a.glb", document)):
-        run = call("diff", other, nameless)
-        assert run.err == ""
-        assert "3 clips compared, max 0 mm" in run.text
+    run = call("diff", saved(tmp_path / "a.glb", document), nameless)
+    assert "\nwave → #1 " in run.text
+    assert run.err == f"warning: no clip and no node {BY_ORDER.format('both')}\n"
+    run = call("diff", nameless, nameless)
+    assert run.err == "", "nothing contradicts the order"
+    assert "3 clips compared, max 0 mm" in run.text
 
 
 def saved(path: Path, document: Document) -> Path:

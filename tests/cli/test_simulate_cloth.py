@@ -131,7 +131,7 @@ def test_the_picture_of_cloth_draws_every_solver(fixture: Fixture, call: Call, t
     drawn = report.read_text()
     assert "Step 1/240 s, ω·h = 20.67: all but implicit-euler, relaxation, xpbd diverge" in drawn
     assert "this run: ω·h = 20.67 →" in drawn
-    assert "cloth: steps of 1/240 s, 0.1 s: energy " in drawn  # and the run itself
+    assert "cloth: steps of 1/240 s, 0.1 s, by xpbd: energy " in drawn  # and the run itself
     for words in ("kinetic", "potential", "Poses from 0 to 0.1 s", "% at most"):
         assert words in drawn
 

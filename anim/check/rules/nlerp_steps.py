@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,10 +17,16 @@ from anim.gltf.document import Document
 from anim.maths import quaternion
 from anim.model import Interpolation, Track
 
+ANGLE_DEG = 45
+ADD_KEYS = "to add keys there: gltf-anim check FILE --fix --select GA102"  # a frame rate may need several tries
+
 
 def find(file: CheckedFile, parameters: Parameters) -> Iterator[Occurrence]:
     """Yield the clips with the number of such steps."""
-    yield from file.at_keys((table, _wide(table, parameters["angle"])) for table in file.tracks("rotation", _is_linear))
+    angle = parameters["angle"]
+    option = "" if angle == ANGLE_DEG else f" --param GA102.angle={angle:g}"
+    for each in file.at_keys((table, _wide(table, angle)) for table in file.tracks("rotation", _is_linear)):
+        yield replace(each, advice=f"{ADD_KEYS}{option}")
 
 
 def _wide(table: TrackTable, angle: float) -> Bools:
@@ -48,8 +55,8 @@ RULE = Rule(
     "Players that mix components (nlerp: Unity) are off slerp by 0.27° at 60° and 0.92° at 90°.",
     find,
     counted("rotation of more than 45° between keys", "rotations of more than 45° between keys"),
-    "to add keys: gltf-anim resample IN OUT --fps {finer}{clips}",
-    parameters={"angle": Parameter(45, "deg", "largest step")},
+    ADD_KEYS,
+    parameters={"angle": Parameter(ANGLE_DEG, "deg", "largest step")},
     fix=Fix("add keys between by slerp", fix, is_safe=True),
     is_default=False,
     targets={"unity": Severity.WARNING},

@@ -149,15 +149,19 @@ def skins(document: Document) -> tuple[tuple[int, Skin], ...]:
 
 def clip_label(name: str, number: int, what: str = "clip") -> str:
     """Return a label for messages: "clip 'walk'", or "clip #3" for an unnamed clip (or another `what`)."""
-    return f"{what} '{name}'" if name else f"{what} {clip_name(name, number)}"
+    return f"{what} {quote_clip(name, number)}"
 
 
 def clip_labels(clips: Sequence[tuple[str, int]]) -> str:
     """Return a label for several clips, by names and indices: "clips 'walk', #3, 'run' and 4 more"."""
     if len(clips) == 1:
         return clip_label(*clips[0])
-    names = [f"'{name}'" if name else clip_name(name, number) for name, number in clips]
-    return f"clips {list_some(names, FEW)}"
+    return f"clips {list_some([quote_clip(*each) for each in clips], FEW)}"
+
+
+def quote_clip(name: str, number: int) -> str:
+    """Return a clip's name for sentences: "'walk'", or "#3" for an unnamed one."""
+    return f"'{name}'" if name else clip_name(name, number)
 
 
 def choose_option(numbers: Collection[int]) -> str:

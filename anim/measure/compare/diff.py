@@ -148,8 +148,9 @@ def _end_warnings(clips: Sequence[ClipDiff]) -> Iterator[str]:
     ends = [each for each in clips if abs(each.end_old - each.end_new) > END_TOLERANCE_S]
     if ends:
         first, more = ends[0], f" (and {len(ends) - 1} more)" if len(ends) > 1 else ""
+        clip = clip_label(first.name, first.old)
         yield (
-            f"clip '{first.name}' ends at {first.end_new:.6g} s instead of {first.end_old:.6g} s{more}: "
+            f"{clip} ends at {first.end_new:.6g} s instead of {first.end_old:.6g} s{more}: "
             "as a loop it repeats at another time"
         )
 

@@ -27,6 +27,7 @@ from anim.measure.loops.seam import Seam, measure_seams
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Clip
 from anim.sampling.clips import sample_world_matrices
+from anim.sampling.times import check_fps
 
 INVISIBLE_GAP_PER_FRAME = 0.1  # of the usual motion per frame: a gap between those two is visible above this
 MAX_COUNT = 10**12  # frames that indices in float64 tell apart
@@ -55,7 +56,7 @@ class Loop:
     start, end: seconds. seam: m, loop gap: the largest distance of a vertex from its position at the start, without
     root motion. speed_seam: m/s, velocity gap. node: joint with the largest gap, by velocity if the loop is closed.
     frame: m, the motion per frame at the gap. inside: the motion from frame to frame. travel: m, root motion. fps: the
-    frame rate of the analysis. joints: those that are open, the largest gap first; none of a closed loop.
+    frame rate of `frame` and `inside`. joints: those that are open, the largest gap first; none of a closed loop.
     """
 
     kind: LoopKind
@@ -71,42 +72,56 @@ class Loop:
     joints: tuple[JointGap, ...] = ()
 
 
-def analyze_loop(skin: SkinMotion, clip: Clip, *, root: int = -1) -> Loop:
-    """Return the kind of loop of a clip. root: node whose displacement is ignored, −1 for none."""
-    return analyze_loops(skin, [clip], [root])[0]
+def analyze_loop(skin: SkinMotion, clip: Clip, *, root: int = -1, fps: float | None = None) -> Loop:
+    """Return the kind of loop of a clip. root: node whose displacement is ignored, −1 for none. fps: its frame rate."""
+    return analyze_loops(skin, [clip], [root], fps=fps)[0]
 
 
-def analyze_loops(skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int]) -> list[Loop]:
+def analyze_loops(
+    skin: SkinMotion, clips: Sequence[Clip], roots: Sequence[int], *, fps: float | None = None
+) -> list[Loop]:
     """Return the kind of loop of each clip: thousands are measured in as few calls as one.
 
     Closed: no visible jump of a vertex. Closed except some joints: fewer joints are open than close while they move,
     and they jump no further than the clip moves from frame to frame. Open by one frame: the gap is about the next
-    frame's motion. roots: nodes whose displacement is ignored, −1 for none.
+    frame's motion. roots: nodes whose displacement is ignored, −1 for none. fps: frame rate of all clips, for steps
+    that are compared with those of other keys; None for that of each clip's keys. Raises RangeError unless above 0.
     """
+    rate = None if fps is None else check_fps(fps)
     ranges = [LoopRange(each, each.start, each.end, root=i) for each, i in zip(clips, roots, strict=True)]
-    return measure_on_parts(skin, ranges, _judge)
+    return measure_on_parts(skin, ranges, lambda some, parts: _judge(some, parts, rate))
 
 
-def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float = 0.0, count: int = 3) -> list[Loop]:
+def best_ranges(
+    skin: SkinMotion,
+    clip: Clip,
+    *,
+    root: int = -1,
+    shortest: float = 0.0,
+    count: int = 3,
+    fps: float | None = None,
+) -> list[Loop]:
     """Return the time ranges of a clip that loop best, the best first.
 
     None is shorter than `shortest` seconds, by default half of the clip. Poses and velocities are compared at the
-    clip's frame rate, or at MAX_FRAMES frames if there are more; ranges that start and end within two frames of a
-    better one are left out. Raises RangeError for a negative `shortest`, or one that isn't finite.
+    clip's frame rate (`fps`, None for that of its keys), or at MAX_FRAMES frames if there are more; ranges that start
+    and end within two frames of a better one are left out. Raises RangeError for a negative `shortest`, or one that
+    isn't finite, and unless fps is above 0.
     """
     if not 0 <= shortest < np.inf:
         raise RangeError(f"`shortest` is {shortest:g} s (expected 0 or more)")
     duration = clip.end - clip.start
     if duration <= 0:
         return []
-    fps = min(loop_frame_rate(clip), (MAX_FRAMES - 1) / duration)
-    times = clip.start + np.arange(int(duration * fps + 1e-6) + 1) / fps
+    rate = None if fps is None else check_fps(fps)
+    compared = min(rate or loop_frame_rate(clip), (MAX_FRAMES - 1) / duration)
+    times = clip.start + np.arange(int(duration * compared + 1e-6) + 1) / compared
     points = skin.places(clip, times, root)
     speeds = np.gradient(points, axis=1) if points.shape[1] > 1 else np.zeros_like(points)
     features = np.concatenate((points, speeds), axis=0).transpose(1, 0, 2).reshape(len(times), -1)
     squares = (features * features).sum(axis=1)
     apart = squares[:, None] + squares[None] - 2 * features @ features.T
-    frames = max(int(min(np.ceil((shortest or duration / 2) * fps - 1e-6), MAX_FRAMES)), 1)
+    frames = max(int(min(np.ceil((shortest or duration / 2) * compared - 1e-6), MAX_FRAMES)), 1)
     apart[np.tril_indices(len(times), frames - 1)] = np.inf
     taken: list[tuple[int, int]] = []
     for flat in np.argsort(apart, axis=None)[: 400 * count].tolist():
@@ -115,7 +130,7 @@ def best_ranges(skin: SkinMotion, clip: Clip, *, root: int = -1, shortest: float
             break
         if all(abs(a - c) > 2 or abs(b - d) > 2 for c, d in taken):
             taken.append((a, b))
-    found = _judge(skin, [LoopRange(clip, float(times[a]), float(times[b]), root=root) for a, b in taken])
+    found = _judge(skin, [LoopRange(clip, float(times[a]), float(times[b]), root=root) for a, b in taken], rate)
     looping = [each for each in found if each.kind is not LoopKind.NOT_A_LOOP] or found
     return sorted(looping, key=lambda each: (list(LoopKind).index(each.kind), each.seam))
 
@@ -129,9 +144,9 @@ class _Facts(NamedTuple):
     travel: float
 
 
-def _judge(skin: SkinMotion, parts: Sequence[LoopRange]) -> list[Loop]:
-    """The analyses of time ranges, whatever their `frame`."""
-    rates = [loop_frame_rate(each.clip) for each in parts]
+def _judge(skin: SkinMotion, parts: Sequence[LoopRange], fps: float | None) -> list[Loop]:
+    """The analyses of time ranges, whatever their `frame`. fps: of all of them, None for those of their keys."""
+    rates = [fps or loop_frame_rate(each.clip) for each in parts]
     parts = [
         each._replace(frame=frame_duration(fps, each.start, each.end)) for each, fps in zip(parts, rates, strict=True)
     ]

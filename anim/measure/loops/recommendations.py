@@ -24,16 +24,18 @@ ADVICE = {  # with {blend} and {clips} for the options
 }
 
 
-def recommend(found: Sequence[tuple[int, Loop]]) -> Iterator[str]:
-    """Yield a line for each kind of open clips, in pose or velocity. found: indices and analysis.
+def recommend(found: Sequence[tuple[int, Loop]], *, fps: float | None = None) -> Iterator[str]:
+    """Yield a line for each kind of open clips, in pose or velocity. found: indices and analysis. fps: if it was given.
 
     recommend([(0, open_by_one_frame)]) → "to add the last frame that is missing: gltf-anim loop IN OUT --clip '#0'"
     """
+    rate = "" if fps is None else f" --fps {fps:.12g}"  # at which these kinds are found again
     for kind, advice in ADVICE.items():
         of_kind = [(number, each) for number, each in found if each.kind is kind and _is_open(each)]
         if of_kind:
             clips = "".join(f" --clip '#{number}'" for number, _ in of_kind)  # all: others stay unchanged
-            yield advice.format(blend=blend_option([each.end - each.start for _, each in of_kind]), clips=clips)
+            blend = blend_option([each.end - each.start for _, each in of_kind])
+            yield advice.format(blend=blend, clips=f"{rate}{clips}")
 
 
 def _is_open(loop: Loop) -> bool:

@@ -19,15 +19,17 @@ from anim.show.plots.figure import (
     separate_labels,
     style,
 )
-from anim.show.plots.stability_plot import STABILITY_HEIGHT, draw_stability, stability_plot
+from anim.show.plots.stability_plot import STABILITY_HEIGHT, draw_stability
 from anim.show.plots.stability_titles import format_step
+from anim.simulation.comparison import Comparison
 from anim.simulation.report import RunHistory, SimulationReport
 
-WIDTH, LEFT, HEAD = 11.6, 0.75, 0.95  # inches
+WIDTH, EDGE, LEFT, HEAD = 11.6, 0.25, 0.75, 0.95  # inches
 ENERGY, ERROR, GAP, POSES = 2.3, 1.1, 0.55, 4.0
 LABELS, CURVES = 1.1, 6.3
 NUM_POSES = 9
 RUN_HEIGHT = HEAD + POSES + 0.5
+HEAD_ONLY, BANNER = 0.75, 0.3  # the words on a run without curves, and those above the comparison
 MANY_EDGES = 200  # drawn as thin lines
 MAX_PATHS = 60  # points with a path; more only fill the picture
 
@@ -37,29 +39,45 @@ def simulation_plot(report: SimulationReport, *, kind: str) -> bytes:
 
     Raises UnsupportedError where matplotlib is not installed.
     """
-    if report.compare is not None and report.history is None:
-        return stability_plot(report.compare(), kind=kind)
     with style(kind):
-        has_error = report.history is not None and len(report.history.errors) > 0
-        below = 0.0 if report.compare is None else STABILITY_HEIGHT
-        sheet = Figure(WIDTH, RUN_HEIGHT + below)
-        sheet.text(LEFT - 0.4, 0.35, _title(report), fontsize=TITLE + 2, weight="bold")
-        sheet.text(LEFT - 0.4, 0.6, report.advice or _subtitle(report), color=SOFT)
+        compared = None if report.compare is None else report.compare()
+        top = HEAD_ONLY if compared is not None and report.history is None else RUN_HEIGHT
+        sheet = Figure(WIDTH, top + (0.0 if compared is None else BANNER + STABILITY_HEIGHT))
+        sheet.text(EDGE, 0.35, _title(report, compared), fontsize=TITLE + 2, weight="bold")
+        sheet.text(EDGE, 0.6, _subtitle(report), color=SOFT)
         if report.history is not None and len(report.history.times) > 1:
-            _draw_energy(sheet, report.history, POSES if not has_error else ENERGY)
-            if has_error:
-                _draw_error(sheet, report.history)
-            _draw_poses(sheet, report.history)
-        if report.compare is not None:
-            sheet.offset = RUN_HEIGHT
-            draw_stability(sheet, report.compare())
+            _draw_run(sheet, report.history)
+        if compared is not None:
+            sheet.offset = top + BANNER
+            sheet.text(EDGE, 0.0, _banner(compared), fontsize=TITLE)
+            draw_stability(sheet, compared)
         return sheet.render(kind)
 
 
-def _title(report: SimulationReport) -> str:
-    start = f"{report.kind}: steps of {format_step(report.step_s)}, {format_number(report.duration_s)} s"
+def _draw_run(sheet: Figure, history: RunHistory) -> None:
+    has_error = len(history.errors) > 0
+    _draw_energy(sheet, history, POSES if not has_error else ENERGY)
+    if has_error:
+        _draw_error(sheet, history)
+    _draw_poses(sheet, history)
+
+
+def _banner(compared: Comparison) -> str:
+    """The words above the comparison, whose curves are not those of the run."""
+    others = "" if compared.method in {run.name for run in compared.runs} else "; this run is by none of them"
+    return f"For comparison: {compared.about}, by every integrator{others}"
+
+
+def _title(report: SimulationReport, compared: Comparison | None) -> str:
+    method = "" if compared is None or not compared.method else f", by {compared.method}"
+    start = f"{report.kind}: steps of {format_step(report.step_s)}, {format_number(report.duration_s)} s{method}"
     if report.first_bad_step is not None:
         return f"{start}: diverges at {format_number(report.first_bad_step * report.step_s)} s"
+    return ": ".join([start, *_results(report)[:1]])
+
+
+def _results(report: SimulationReport) -> list[str]:
+    """The figures of a run in words, the first of them for the title."""
     parts = []
     if report.energy_j is not None:
         drawn = None if report.history is None else report.history.energies.get("total")
@@ -72,16 +90,17 @@ def _title(report: SimulationReport) -> str:
         parts.append(f"stretched by {float(100 * report.worst_stretch['fraction']):.2g} % at most")
     if report.error_estimate_m is not None:
         parts.append(f"a run with half the step differs by up to {_length(report.error_estimate_m)}")
-    return ": ".join([start, ", ".join(parts)]) if parts else start
-
-
-def _subtitle(report: SimulationReport) -> str:
-    parts = []
     if report.penetration_m is not None:
         parts.append(f"deepest penetration {_length(report.penetration_m)}")
     if report.loop_seam_m is not None:
         parts.append(f"seam of the loop {_length(report.loop_seam_m)}")
-    return ", ".join(parts)
+    return parts
+
+
+def _subtitle(report: SimulationReport) -> str:
+    """Advice, and the figures that the title lacks."""
+    left = _results(report)[0 if report.first_bad_step is not None else 1 :]
+    return "; ".join(filter(None, (report.advice, ", ".join(left))))
 
 
 def _length(meters: float) -> str:

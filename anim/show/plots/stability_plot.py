@@ -42,6 +42,7 @@ COLORS = {
     "xpbd": "#7b3294",
 }
 SHOWN = ("explicit-euler", "verlet", "implicit-euler", "xpbd")  # drawn as poses: gains, keeps, loses energy
+OWN = "this run's: "  # before the result of the simulation's own method
 THICK, THIN = 2.0, 1.2
 NUM_POSES = 9
 MAX_SHOWN_GROWTH = 4  # of energy, beyond which a run leaves the picture
@@ -70,29 +71,36 @@ def stability_plot(compared: Comparison, *, kind: str) -> bytes:
 
 
 def draw_stability(sheet: Figure, compared: Comparison) -> None:
-    """Draw the plot on a sheet of its width, STABILITY_HEIGHT inches high."""
+    """Draw the plot on a sheet of its width, STABILITY_HEIGHT inches high; the method of a simulation is marked."""
     runs, omega_h, step, springs = compared.runs, compared.omega_h, compared.step, compared.springs
+    own = compared.method
     equation = TEST_EQUATIONS[compared.test_equation]
     sheet.text(LEFT - 0.4, 0.35, title(runs, equation, omega_h, step), fontsize=TITLE + 2, weight="bold")
     sheet.text(LEFT - 0.4, 0.6, subtitle(equation, omega_h, step), color=SOFT)
-    _draw_energy(sheet, runs)
-    draw_gain(sheet, equation, omega_h)
+    _draw_energy(sheet, runs, own)
+    draw_gain(sheet, equation, omega_h, own)
     top = HEAD + LOG + 0.25 + CHANGE + GAP + 0.3
-    shown = [run for name in SHOWN for run in runs if run.name == name]
+    shown = [run for name in _shown(own) for run in runs if run.name == name]
     width = (WIDTH - LEFT - 0.2) / len(shown)
     drawn = [motion_points(run, springs, omega_h / step) for run in shown]
     span = _span(shown, drawn)
     for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
-        _draw_motion(sheet, run, points, springs, (LEFT - 0.4 + i * width, top, width - 0.15), span)
+        place = LEFT - 0.4 + i * width, top, width - 0.15
+        _draw_motion(sheet, run, points, springs, place, span, OWN if run.name == own else "")
 
 
-def _draw_energy(sheet: Figure, runs: Sequence[IntegratorRun]) -> None:
+def _shown(own: str) -> tuple[str, ...]:
+    """The methods that are drawn as poses and thick, that of a simulation first."""
+    return tuple(dict.fromkeys((own, *SHOWN)))
+
+
+def _draw_energy(sheet: Figure, runs: Sequence[IntegratorRun], own: str) -> None:
     width = CURVES - LEFT - LABELS
     high = sheet.panel(LEFT, HEAD, width, LOG)
     low = sheet.panel(LEFT, HEAD + LOG + 0.25, width, CHANGE)
     end = max(float(run.times[-1]) for run in runs) or 1.0
     for run in runs:
-        look = {"color": COLORS[run.name], "linewidth": THICK if run.name in SHOWN else THIN}
+        look = {"color": COLORS[run.name], "linewidth": THICK if run.name in _shown(own) else THIN}
         factor = run.energies / run.energies[0]
         high.semilogy(run.times, np.maximum(factor, 1e-3), **look)
         low.plot(run.times, 100 * (factor - 1), **look)
@@ -109,17 +117,17 @@ def _draw_energy(sheet: Figure, runs: Sequence[IntegratorRun]) -> None:
     low.set_xlabel("seconds", fontsize=SMALL, color=SOFT)
     sheet.text(LEFT, HEAD - 0.1, "Energy, factor of the start", fontsize=TEXT)
     sheet.text(LEFT, HEAD + LOG + 0.2, "the same, % gained or lost", fontsize=SMALL, color=SOFT)
-    _draw_labels(sheet, runs, LEFT + width + 0.12)
+    _draw_labels(sheet, runs, LEFT + width + 0.12, own)
 
 
-def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float) -> None:
+def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float, own: str) -> None:
     """The name and result of each run, in the order of its energy, beside the curves."""
     order = sorted(runs, key=lambda run: -(1e9 - run.diverged_at if run.diverged_at else run.energy_change))
     heights = separate_labels([HEAD + 0.1 + 0.44 * i for i in range(len(order))], 0.44, HEAD, HEAD + LOG + CHANGE)
     for run, y in zip(order, heights, strict=True):
         sheet.text(x, y, run.name, color=COLORS[run.name], weight="bold")
         words = f"diverges at {run.diverged_at:.2f} s" if run.diverged_at is not None else _change(run)
-        sheet.text(x, y + 0.15, words, fontsize=SMALL, color=SOFT)
+        sheet.text(x, y + 0.15, f"{OWN if run.name == own else ''}{words}", fontsize=SMALL, color=SOFT)
 
 
 def _keeps_energy(run: IntegratorRun) -> bool:
@@ -142,7 +150,7 @@ def _change(run: IntegratorRun) -> str:
     return words.replace("-", "−")
 
 
-def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> Axes:
+def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float, own: str = "") -> Axes:
     """Draw the gain of each integrator per step, its limits and this run; return the axes."""
     left = CURVES + 0.45
     height = LOG + 0.25 + CHANGE
@@ -156,7 +164,7 @@ def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> Axes:
                 w,
                 equation.gain(method, w),
                 color=COLORS[name],
-                linewidth=THICK if name in SHOWN else THIN,
+                linewidth=THICK if name in _shown(own) else THIN,
                 linestyle=dotted,
             )
     axes.axhspan(1, MAX_GAIN, color="#d55e00", alpha=0.06, linewidth=0)
@@ -169,7 +177,7 @@ def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> Axes:
     side = {"fontsize": SMALL, "ha": "left" if is_left else "right"}
     axes.text(x * equation.max_value, grows, "grows", color="#a33", **side)
     axes.text(x * equation.max_value, lowest + 0.03, "fades", color=SOFT, **side)
-    _mark_run(axes, equation, omega_h, lowest)
+    _mark_run(axes, equation, omega_h, lowest, own)
     axes.set_xlim(0, equation.max_value)
     axes.set_ylim(lowest, MAX_GAIN)
     axes.set_xlabel(equation.about, fontsize=SMALL, color=SOFT)
@@ -177,7 +185,7 @@ def draw_gain(sheet: Figure, equation: TestEquation, omega_h: float) -> Axes:
     return axes
 
 
-def _mark_run(axes: Axes, equation: TestEquation, omega_h: float, lowest: float) -> None:
+def _mark_run(axes: Axes, equation: TestEquation, omega_h: float, lowest: float, own: str) -> None:
     """This run's ω·h, with the gains of the integrators that are drawn thick."""
     words = f"{equation.symbol} = {format_product(omega_h)}"
     if omega_h > equation.max_value:
@@ -185,7 +193,7 @@ def _mark_run(axes: Axes, equation: TestEquation, omega_h: float, lowest: float)
     if not 0 < omega_h <= equation.max_value:
         return
     axes.axvline(omega_h, color=INK, linewidth=1, linestyle="--")
-    for name in (each for each in SHOWN if each in INTEGRATORS):
+    for name in (each for each in _shown(own) if each in INTEGRATORS):
         gain = float(equation.gain(INTEGRATORS[name], np.array(omega_h)))
         if lowest <= gain <= MAX_GAIN:
             axes.plot([omega_h], [gain], "o", color=COLORS[name], markersize=5, clip_on=False)
@@ -234,14 +242,16 @@ def _draw_motion(
     springs: Ints,
     place: tuple[float, float, float],
     span: tuple[Floats, float],
+    mark: str,
 ) -> None:
+    """mark: words before those on the duration."""
     x, y, width = place
     last = len(run.times) - 1
     phase = len(springs) == 1
     until = min(last, int(np.searchsorted(run.times, 1.0)) if not phase else last)
     what = "phase space: velocity / ω against position" if phase else f"0 to {run.times[until]:.2f} s"
     wide = sheet.text(x, y - 0.12, run.name, color=COLORS[run.name], weight="bold")
-    sheet.text(x + wide + 0.1, y - 0.12, what, fontsize=SMALL, color=SOFT)
+    sheet.text(x + wide + 0.1, y - 0.12, f"{mark}{what}", fontsize=SMALL, color=SOFT)
     axes = sheet.panel(x, y, width, POSES)
     axes.grid(visible=False)
     axes.set_xticks([])

@@ -16,6 +16,7 @@ from anim.simulation.cloth.options import ClothOptions
 from anim.simulation.cloth.runs import run_solver
 from anim.simulation.comparison import Comparison, IntegratorRun, compare_integrators
 
+ABOUT = "the cloth as it is at 0 s, let go without colliders and wind"
 MAX_COMPARED_S = 1.0
 START_PER_EDGE = 0.002
 MAX_POINT_STEPS = 150_000  # points times steps: implicit Euler solves a linear system in each
@@ -43,7 +44,9 @@ def compare(model: ClothModel, driver: ClothDriver, options: ClothOptions, subst
     loose = replace(options, environment=environment)
     for name in ("relaxation", "xpbd"):
         runs.append(_run(model, resting, replace(loose, solver=name), x, step, duration, lowest))
-    return Comparison(_from_lowest(runs), system.max_frequency() * step, step, model.topology.edges)
+    method = options.integrator if options.solver == "mass-spring" else options.solver
+    stiffest = system.max_frequency() * step
+    return Comparison(_from_lowest(runs), stiffest, step, model.topology.edges, about=ABOUT, method=method)
 
 
 def _from_lowest(runs: list[IntegratorRun]) -> list[IntegratorRun]:

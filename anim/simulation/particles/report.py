@@ -17,6 +17,7 @@ from anim.simulation.particles.solver import DivergedError, ParticleKeys, Partic
 from anim.simulation.report import SimulationReport, advise_drag_step, advise_half_step, advise_step
 from anim.simulation.steps import Steps
 
+ABOUT = "some of the particles, all emitted at 0 s"
 MAX_COMPARED = 60  # particles; more don't show more
 COMPARED_S = 3.0
 NO_EDGES: Ints = np.zeros((0, 2), np.int64)
@@ -124,7 +125,8 @@ def compare_particles(births: Births, options: ParticleOptions, motion: NodeMoti
     speed = float(np.linalg.norm(births.velocities, axis=1).max(initial=0.0))
     value, _, _ = _stability(options, step, speed)
     is_drag = value is not None and not options.attractors
-    return Comparison(made, value or 0.0, step, NO_EDGES, "drag" if is_drag else "oscillator")
+    equation = "drag" if is_drag else "oscillator"
+    return Comparison(made, value or 0.0, step, NO_EDGES, equation, about=ABOUT, method=options.integrator)
 
 
 def _run(name: str, births: Births, options: ParticleOptions, motion: NodeMotion, steps: Steps) -> IntegratorRun:

@@ -59,7 +59,7 @@ def make_report(
         loop_seam_m=None if result.loop is None else result.loop.seam,
         figures=figures,
         advice=advice,
-        compare=lambda: compare_springs(skeleton, bones, result.step),
+        compare=lambda: compare_springs(skeleton, bones, result.step, options.integrator),
     )
 
 
@@ -81,7 +81,7 @@ def report_divergence(
         first_bad_step=error.report if isinstance(error.report, int) else None,
         figures={"joints": len(bones.nodes)},
         advice=advice or error.help,
-        compare=lambda: compare_springs(skeleton, bones, options.step),
+        compare=lambda: compare_springs(skeleton, bones, options.step, options.integrator),
     )
     return UnstableError(error.problem, where=error.where, help=advice or error.help).with_report(report)
 

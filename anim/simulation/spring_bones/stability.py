@@ -17,10 +17,12 @@ from anim.simulation.spring_bones.hierarchy import tail_at_rest
 LEAN = 0.3  # of the start, relative to the distance from the root
 COMPARED_S = 3.0
 NO_GRAVITY = (0.0, 0.0, 0.0)
+ABOUT = "the chains as masses on springs, let go from a lean without damping"
+VRM, EXACT = "VRM's spring bones", "exact oscillators"  # methods without an integrator
 
 
-def compare_springs(skeleton: Skeleton, bones: SpringBones, step: float) -> Comparison:
-    """Return the chains, released from a lean without damping, by every integrator.
+def compare_springs(skeleton: Skeleton, bones: SpringBones, step: float, integrator: str) -> Comparison:
+    """Return the chains, released from a lean without damping, by every integrator. integrator: that of the run, or "".
 
     Each tail is a mass of 1 kg on a spring to its position at rest. For joints by VRM the frequency is that of small
     angles: in one step of h the tail moves stiffness · h towards rest, (ωh)² = stiffness · h / length.
@@ -42,7 +44,12 @@ def compare_springs(skeleton: Skeleton, bones: SpringBones, step: float) -> Comp
     x = np.concatenate([rest, rest + LEAN * distances[:, None] * _sideways(rest - heads, rest)])
     fastest = float(omega.max()) * step
     runs = compare_integrators(system, x, np.zeros_like(x), step=step, duration=COMPARED_S)
-    return Comparison(runs, fastest, step, edges)
+    return Comparison(runs, fastest, step, edges, about=ABOUT, method=integrator or _method(joints))
+
+
+def _method(joints: list[SpringJoint]) -> str:
+    """The methods of a run without an integrator, in words."""
+    return " and ".join(sorted({VRM if each.parameters.frequency is None else EXACT for each in joints}))
 
 
 def find_omega(joint: SpringJoint, length: float, step: float) -> float:

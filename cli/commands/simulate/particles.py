@@ -237,7 +237,7 @@ def command(
         _note_many_nodes(len(run.nodes), form, reporter)
         merged = (number, driver) if merge and number is not None else None
         if number is not None and merged is None:
-            note_own_clip(name, driver, reporter)
+            note_own_clip(name, driver, number, reporter)
         return add_particles(document, run, name, merged, form.value), run.report, _summary(run.report)
 
     reporter = Reporter(quiet, verbose)

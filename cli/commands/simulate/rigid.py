@@ -114,7 +114,7 @@ def command(
             reporter.warn(note)
         merged = (number, driver) if merge and number is not None else None
         if number is not None and merged is None:
-            note_own_clip(name, driver, reporter)
+            note_own_clip(name, driver, number, reporter)
         return add_rigid_motion(document, run, name, merged), run.report, _summary(run.report)
 
     simulate_clip(input, output, clip, simulate, reporter, report=report, dry_run=dry_run, uses=PHYSICS)

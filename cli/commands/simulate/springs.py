@@ -115,7 +115,7 @@ def command(
     each joint is a damped oscillator instead, solved exactly, and stable at every step. Its damping is relative to the
     parent: a joint arrives with the parent's speed, so where that stops at once even --damping-ratio 1 passes the rest
     pose once, by speed / (e · angular frequency). With --integrator it is a mass on a spring: bones stretch, and a step
-    that is too long diverges; --report springs.png draws every integrator.
+    that is too long diverges; --report springs.png compares every integrator on these chains.
 
     --loop runs the clip until the motion repeats within 0.1 mm, or else blends the last 0.2 s; its step is the nearest
     that divides the clip. --scale-aware moves a scaled model by the angles of the model without scale.

@@ -224,3 +224,13 @@ def test_gap_and_speed_are_the_same_without_motion_per_frame(targets: ArrayLike 
     assert (alone.gap, alone.speed, alone.fastest) == pytest.approx((both[1].gap, both[1].speed, both[1].fastest))
     assert (alone.frame, alone.going_on) == (0.0, alone.gap)
     assert both[1].frame > 0
+
+
+def test_steps_are_those_of_the_stated_rate() -> None:
+    """A vertex half a metre from the axis at 90°/s: sin(θ/2) m per frame, whatever the spacing of the keys."""
+    turn = clip(track("rotation", [0.0, 1.0], about("z", [0, 90]), node=2))
+    for fps in (10, 24, 90):
+        found = analyze_loop(SkinMotion(CHAIN), turn, fps=fps)
+        assert found.fps == fps
+        assert found.inside.largest == pytest.approx(np.sin(np.radians(45 / fps)), rel=1e-5)
+    assert analyze_loop(SkinMotion(CHAIN), turn).fps == 30, "of keys that are not regular"

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from anim.show.plots.simulation_plot import simulation_plot
 from anim.simulation.comparison import Comparison, compare_integrators
@@ -25,8 +26,9 @@ def test_the_title_and_the_curves_are_those_of_the_run() -> None:
     energy = {"start": 120.0, "end": 119.5, "peak": 120.0}  # above another zero than the curves
     report = SimulationReport("rigid", 1 / 240, 240, 60, 1.0, energy_j=energy, error_estimate_m=1e-3)
     drawn = simulation_plot(_with(report, history=_history()), kind="svg").decode()
-    assert "rigid: steps of 1/240 s, 1 s: energy 20 → 19.5 J, a run with half the step differs by up to 1 mm" in drawn
     for words in (
+        "rigid: steps of 1/240 s, 1 s: energy 20 → 19.5 J",
+        "a run with half the step differs by up to 1 mm",
         "kinetic",
         "potential",
         "total",
@@ -44,15 +46,27 @@ def test_a_run_that_diverges_says_when_and_what_to_do() -> None:
     assert "a smaller --step: 1/20" in drawn
 
 
-def test_a_system_is_drawn_by_every_integrator() -> None:
+@pytest.mark.parametrize(
+    ("method", "marked", "words"),
+    [("rk4", 2, ""), ("exact oscillators", 0, "; this run is by none of them")],
+)
+@pytest.mark.parametrize("history", [None, _history()])
+def test_a_system_is_drawn_by_every_integrator(
+    history: RunHistory | None, method: str, marked: int, words: str
+) -> None:
+    """Below the run: the comparison was the picture, so that explicit Euler of its title looked like the run."""
     system, x = oscillator(20), np.array([[0.0, 0, 0], [1.0, 0, 0]])
 
     def compare() -> Comparison:
         runs = compare_integrators(system, x, 0 * x, step=1 / 60, duration=1)
-        return Comparison(runs, 20 / 60, 1 / 60, np.array([[0, 1]]))
+        return Comparison(runs, 20 / 60, 1 / 60, np.array([[0, 1]]), about="springs let go", method=method)
 
-    report = SimulationReport("springs", 1 / 60, 60, 60, 1.0, compare=compare)
-    assert "explicit-euler" in simulation_plot(report, kind="svg").decode()
+    report = SimulationReport("springs", 1 / 60, 60, 60, 1.0, compare=compare, history=history)
+    drawn = simulation_plot(report, kind="svg").decode()
+    assert f"springs: steps of 1/60 s, 1 s, by {method}" in drawn
+    assert f"For comparison: springs let go, by every integrator{words}" in drawn
+    assert drawn.count("this run&#x27;s: ") + drawn.count("this run's: ") == marked, "of the label and of the motion"
+    assert "explicit-euler" in drawn
 
 
 def test_what_the_picture_needs_is_not_in_the_json() -> None:

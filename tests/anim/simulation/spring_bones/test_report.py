@@ -72,7 +72,9 @@ def test_the_report_of_masses_on_springs_states_energy_stretch_and_the_limit() -
 
 @pytest.mark.parametrize("bones", [BONES, OSCILLATORS])
 def test_the_picture_has_every_integrator_on_these_chains(bones: SpringBones) -> None:
-    compared = compare_springs(CHAIN, bones, 1 / 60)
+    compared = compare_springs(CHAIN, bones, 1 / 60, "")
+    assert compared.method == ("exact oscillators" if bones is OSCILLATORS else "VRM's spring bones")
+    assert compare_springs(CHAIN, bones, 1 / 60, "rk4").method == "rk4"
     omega = compared.omega_h * 60
     assert omega == pytest.approx(8 * np.pi if bones is OSCILLATORS else np.sqrt(60 * 0.5 / 0.2), rel=1e-6)
     assert {run.name for run in compared.runs} == set(INTEGRATORS)
