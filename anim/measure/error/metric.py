@@ -38,6 +38,7 @@ NOISE = 1e-7  # of the diagonal: below is the rounding of float32 files, and no 
 SLACK = 1.001  # factor: a bound this close to a found error is not refined
 MAX_SEARCHED = 40_000_000  # vertices per surface and block; if there are more, the bound of the rest is reported
 BLOCK = 40_000  # matrices of nodes per block, each about 600 bytes with derived values
+MIN_TIMES = 4  # of a block: with fewer, work per block takes longer than that per time
 
 
 class Block(NamedTuple):
@@ -258,7 +259,7 @@ class ErrorMetric:
     def length(self) -> int:
         """Maximum number of times of a block."""
         matrices = sum(len(part.groups) for part in self.parts) + sum(map(len, self.skeletons))
-        return max(BLOCK // max(matrices, 1), 8)
+        return max(BLOCK // max(matrices, 1), MIN_TIMES)
 
     def posed(
         self, clips: Sequence[tuple[Clip, Clip]], asked: Sequence[AskedTimes]

@@ -23,7 +23,7 @@ from anim.sampling.world import world_by_node
 MOTION = np.array([-1.0, 1])  # weights of two frames: the motion between them
 VELOCITY_CHANGE = np.array([1.0, -1, -1, 1])  # weights of two times before and two after a key: the change of velocity
 MAX_BATCH_VALUES = 1_000_000  # maximum number of values in the arrays of one step
-MAX_MATRICES = 1_000_000  # maximum number of world matrices at once, 96 bytes each
+MAX_MATRICES = 100_000  # maximum number of world matrices at once, 96 bytes each
 
 
 class SkinMotion:
