@@ -103,7 +103,7 @@ def test_a_folder_that_is_exchanged_with_a_link_is_one_line(
     monkeypatch.setattr("cli.workflows.run.job.check_output", fail)
     run = call("run", "--no-cache")
     assert run.code == 3
-    assert "\ngltf-anim: build/crowd/arm 1.glb: can't be written (" in run.err
+    assert "gltf-anim: build/crowd/arm 1.glb: can't be written (" in run.err
 
 
 def test_a_folder_that_can_not_be_looked_up_is_an_error_of_the_output(

@@ -160,9 +160,12 @@ def copy_external_images(
 
 def glb_chunks(document: Document, unchanged: Bytes | None = None) -> list[Bytes]:
     """Return the chunks of a GLB; `unchanged` itself if it is a GLB with all its buffers."""
-    if unchanged is not None and container.is_glb(unchanged) and not external_size(document):
-        return [unchanged]
-    return container.glb(document)
+    content = container.glb(document)
+    return (
+        [unchanged]
+        if unchanged is not None and container.is_glb(unchanged) and not external_size(document)
+        else content
+    )
 
 
 def external_size(document: Document) -> int:

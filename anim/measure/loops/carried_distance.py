@@ -11,6 +11,7 @@ import numpy as np
 from anim.arrays import Bools, Floats, Ints
 from anim.maths import hierarchy
 from anim.measure.error.point_matrix import PointMatrix
+from anim.measure.loops.rigid_distance import rigid_distances
 from anim.measure.loops.skin_motion import SkinMotion
 from anim.model import Pose, Skeleton
 from anim.sampling.world import world_by_node
@@ -32,6 +33,8 @@ def carried_distances(skin: SkinMotion, ends: Sequence[Pose], clip: Ints, nodes:
         return np.zeros(len(nodes))
     size = max(MAX_MATRICES // len(skin.skeleton), 1)
     is_whole = int(np.bincount(clip).max()) <= size
+    if not is_whole and (found := _rigid_distances(skin, ends, clip, nodes, roots)) is not None:
+        return found
     starts = range(0, len(nodes), size) if is_whole else _block_starts(skin.skeleton, nodes)
     squares = []
     for block in starmap(slice, pairwise([*starts, len(nodes)])):
@@ -41,6 +44,18 @@ def carried_distances(skin: SkinMotion, ends: Sequence[Pose], clip: Ints, nodes:
         else:
             squares.append(_squares_of_part(skin, ends, changed))
     return np.asarray(np.sqrt(np.concatenate(squares)))
+
+
+def _rigid_distances(skin: SkinMotion, ends: Sequence[Pose], clip: Ints, nodes: Ints, roots: Ints) -> Floats | None:
+    """The distances of many nodes whose points have one joint each; None for others. Arguments as there."""
+    parts = []
+    for i in np.unique(clip).tolist():
+        some = [_take_frames(each, slice(i, i + 1)) for each in ends]
+        found = rigid_distances(skin.skeleton, skin.vertices, some, nodes[clip == i], int(roots[i]))
+        if found is None:
+            return None
+        parts.append(found)
+    return np.concatenate(parts)
 
 
 def _block_starts(skeleton: Skeleton, nodes: Ints) -> list[int]:
