@@ -89,7 +89,7 @@ def command(
             inspected, tracks_of_clips = _inspected(path, selection, tracks=tracks, continuity=continuity)
         except AnimError as error:
             if len(paths) < 2 and (format is Format.TEXT or not isinstance(error, FormatError)):
-                raise
+                raise checked_files.advise_name(path, error) from None
             inspected, tracks_of_clips = _unreadable(path, error), ()
         done.append(inspected)
         smooth.append(tracks_of_clips)

@@ -20,7 +20,9 @@ def check_missing(path: str, folder: Path, *, is_made: bool) -> None:
     """Raise OutputError for a folder that isn't there, unless it `is_made` for the output `path`, and can be."""
     if not is_made:
         raise OutputError(f"{path}: there is no folder '{folder}'", help=HELP)
-    above = next(each for each in (folder, *folder.parents) if each.exists())
+    above = next((each for each in (folder, *folder.parents) if each.exists()), None)
+    if above is None:  # as on a drive of Windows that isn't there
+        raise OutputError(f"{path}: there is no '{folder.anchor or folder}'")
     if not above.is_dir():
         raise OutputError(f"{path}: '{above}' is no folder")
     if not os.access(above, os.W_OK):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import glob
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import degrees
@@ -34,7 +32,8 @@ NEAR_DEG = round(degrees(NEAR_LOCK_RAD))
 class ConversionReport:
     """A motion, its conversion, and its character.
 
-    scale_words: origin of meters_per_unit; is_guess: whether that is uncertain.
+    scale_words: origin of meters_per_unit; is_guess: whether that is uncertain. clip_index: of the clip in the
+    character's file, None without one.
     """
 
     format: str
@@ -46,7 +45,7 @@ class ConversionReport:
     onto: CharacterClip | None = None
     character: Skeleton | None = None
     is_guess: bool = False
-    replaced: int | None = None
+    clip_index: int | None = None
 
 
 def warnings(made: ConversionReport) -> Iterator[str]:
@@ -120,8 +119,7 @@ def _leading_pose(made: ConversionReport) -> Iterator[str]:
     if found is not None:
         joints = plural(found.num_joints, "joint")
         jump = f"{joints} jump to the next one, '{converted.skeleton.names[found.node]}' by {degrees(found.angle):.0f}°"
-        name = glob.escape(converted.clip.name) or f"#{made.replaced}"
-        chosen = f" --clip {shlex.quote(name)}" if made.onto is not None else ""  # else it is the only clip
+        chosen = "" if made.clip_index is None else f" --clip '#{made.clip_index}'"  # others may have its name
         advice = f"`trim --from {np.float32(found.end)!s} --rebase{chosen}` removes it from the clip"
         yield f"the first frame is a pose apart from the motion: {jump} ({advice})"
 

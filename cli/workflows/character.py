@@ -110,14 +110,15 @@ def pairs(path: str | None) -> dict[str, str]:
 
 
 def named(made: ConversionReport, document: Document, *, name: str | None, replaced: int | None) -> ConversionReport:
-    """Return the conversion with its clip's name in the character's file, and a note on a duplicate.
+    """Return the conversion with its clip's name and index in the character's file, and a note on a duplicate.
 
     name: as requested, used unchanged; None for the motion's own, with a numeric suffix if a clip has it. replaced:
     index of the clip whose position and name it takes.
     """
     names = reader.names(document)
+    made = replace(made, clip_index=len(names) if replaced is None else replaced)
     if replaced is not None:
-        return _called(replace(made, replaced=replaced), names[replaced])
+        return _called(made, names[replaced])
     own = made.converted.clip.name
     if own not in names:
         return made

@@ -63,9 +63,14 @@ def fault_of(path: str, error: AnimError) -> AnimError:
     name = documents.called(path)
     fault = copy(error)
     fault.where = fault.where.removeprefix(name).removeprefix(": ")
+    return advise_name(path, fault)
+
+
+def advise_name(path: str, error: AnimError) -> AnimError:
+    """Return an error of a file, with advice on its name if there is no file."""
     if path not in ("", documents.PIPE) and not os.path.lexists(path):
-        fault.help = _name_advice(path)
-    return fault
+        error.help = _name_advice(path)
+    return error
 
 
 def _name_advice(path: str) -> str:

@@ -71,7 +71,7 @@ def _table(path: Path) -> dict[str, Any] | None:
     """The settings in a file, None if it has none."""
     try:
         content = tomllib.loads(_read(path).decode("utf-8-sig"))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):  # as above a file that is taken for a folder
         return None
     except OSError as error:
         raise FormatError(f"can't be read ({(error.strerror or str(error)).lower()})", where=str(path)) from None

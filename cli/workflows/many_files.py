@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,7 +46,7 @@ def edit_named(
             help = "the command takes IN and OUT; for more inputs name their outputs by --out"
             raise UsageError(f"got unexpected extra argument ({more[0]})", help=help)
         refuse_folder(input, help="all its files: -o 'out/{path}'")
-        with _advise_folder(output):
+        with _advise_folder(input, output):
             if dry_run and output != documents.PIPE:  # here, since folders of --out are made when files are written
                 check(output)
                 documents.check_file(output, placeholders)
@@ -58,13 +59,14 @@ def edit_named(
 
 
 @contextmanager
-def _advise_folder(output: str) -> Iterator[None]:
-    """Advise --out in the error for an output that is a folder, or named as one."""
+def _advise_folder(input: str, output: str) -> Iterator[None]:
+    """Advise --out in the error for an output that is a folder, or named as one; stdin has no name for a file in it."""
     try:
         yield
     except RefusedOutputError as error:
-        if os.path.isdir(output) or output.endswith(("/", os.sep)):
-            error.advise(f"for a file of the input's name in that folder: -o '{output.rstrip('/' + os.sep)}/'")
+        if input != documents.PIPE and (os.path.isdir(output) or output.endswith(("/", os.sep))):
+            folder = shlex.quote(f"{output.rstrip('/' + os.sep)}/")
+            error.advise(f"for a file of the input's name in that folder: -o {folder}")
         raise
 
 

@@ -180,3 +180,5 @@ def test_advice_on_a_missing_file_is_about_its_name(folder: Path, call: Call) ->
     assert run.code == 3
     assert "correct its name" in run.text
     assert "where the file is made" not in run.text
+    (folder / "file").write_text("")
+    assert "there is no folder 'file'" in call("check", "file/none.glb").text  # its settings are those above

@@ -8,7 +8,7 @@ import pytest
 
 from anim.errors import OutputError
 from anim.files import resolver
-from cli.io import documents
+from cli.io import documents, output_folders
 
 
 def test_a_folder_without_permission_is_no_mistake_of_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -36,3 +36,10 @@ def test_the_folder_of_a_name_that_is_filled_in_is_made_later(tmp_path: Path) ->
         documents.check_file(str(tmp_path / "new" / "walk.npz"), ("clip",))
     assert error.value.help.startswith("make it first")
     assert sorted(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+def test_a_folder_on_a_drive_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows has roots that don't exist; here they do."""
+    monkeypatch.setattr(Path, "exists", lambda path: False)
+    with pytest.raises(OutputError, match=r"^/new/\{clip\}.npz: there is no '/'$"):
+        output_folders.check_missing("/new/{clip}.npz", Path("/new"), is_made=True)

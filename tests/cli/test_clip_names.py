@@ -98,3 +98,6 @@ def test_advice_on_a_replaced_clip_names_it(nameless: Path, call: Call, tmp_path
     run = call("from-euler", motion, tmp_path / "out.glb", "--onto", nameless, "--replace", "#0")
     assert "the first frame is a pose apart" in run.err
     assert "--rebase --clip '#0'` removes it" in run.err
+    run = call("from-euler", motion, tmp_path / "out.glb", "--onto", nameless, "--name", "jump")
+    assert "a second clip 'jump': #3 beside #2" in run.err
+    assert "--rebase --clip '#3'` removes it" in run.err

@@ -183,6 +183,7 @@ def test_a_file_that_is_not_there_is_not_to_be_fixed(call: Call, tmp_path: Path)
         assert run.code == 3
         assert f"{problem}; {advice}\n" in run.text
         assert run.err == f"gltf-anim: {tmp_path / name}: {problem}\nhelp: {advice}\n"
+        assert call("inspect", tmp_path / name).err == run.err
 
 
 def test_folders_and_patterns_are_inspected(call: Call, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -186,12 +187,14 @@ def test_names_of_clips_as_names_of_files(name: str, expected: str) -> None:
 def test_a_folder_that_is_not_there_is_no_file_name(call: Call, walk: Path, tmp_path: Path) -> None:
     run = call("resample", walk, f"{tmp_path}/new/", "--fps", "4")
     assert "there is no such folder" in refusal(run, 2)
-    assert help_line(run) == f"for a file of the input's name in that folder: -o '{tmp_path}/new/'"
+    assert help_line(run) == f"for a file of the input's name in that folder: -o {tmp_path}/new/"
+    assert help_line(call("resample", walk, "it's/", "--fps", "4")).endswith(" -o " + shlex.quote("it's/"))
+    assert "help: " not in call("resample", "-", f"{tmp_path}/new/", "--fps", "4", stdin=walk.read_bytes()).err
     assert list(tmp_path.iterdir()) == [walk]
     assert call("resample", walk, "-o", f"{tmp_path}/new/", "--fps", "4").code == 0
     run = call("resample", walk, tmp_path / "new", "--fps", "4")
     assert "new: is a folder (expected a file name)" in refusal(run, 2)
-    assert help_line(run).endswith(f"-o '{tmp_path}/new/'")
+    assert help_line(run).endswith(f"-o {tmp_path}/new/")
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ QUATERNION_REFLECTION = np.array((1.0, -1.0, -1.0, 1.0))  # of a rotation betwee
 
 
 def match_handedness(source: Skeleton, target: Skeleton, matching: JointMatch) -> Skeleton:
-    """Return the target reflected in world space if only then its rest pose is the source's; else the target.
+    """Return the target reflected in world space if its rest pose is then nearer to the source's; else the target.
 
-    If they differ in build: if one is mirrored by its transforms, and the reflected target is nearer to the source.
+    Builds that differ, and flat figures, which fit both ways, are reflected only if one is mirrored by its transforms.
     Local transforms below the roots stay, so a clip of the reflected skeleton is one of the target: its motion is
     mirrored like the target. A target with a matched root is returned as it is.
     """
@@ -28,11 +28,12 @@ def match_handedness(source: Skeleton, target: Skeleton, matching: JointMatch) -
         return target
     own, others = rest_world(source)[pairs[:, 0]], rest_world(target)[pairs[:, 1]]
     error = fit_similarity(own[:, :, 3], others[:, :, 3]).error
-    if error <= BUILD_TOLERANCE:
-        return target
     reflected = fit_similarity(own[:, :, 3], others[:, :, 3] * REFLECTION).error
-    is_nearer = reflected < error and bool((_is_mirrored(own) != _is_mirrored(others)).all())
-    return _reflect(target) if reflected <= BUILD_TOLERANCE or is_nearer else target
+    if (_is_mirrored(own) != _is_mirrored(others)).all():
+        is_nearer = reflected <= error + BUILD_TOLERANCE
+    else:
+        is_nearer = reflected <= BUILD_TOLERANCE < error
+    return _reflect(target) if is_nearer else target
 
 
 def _is_mirrored(world: Floats) -> Bools:

@@ -30,6 +30,7 @@ LABELS, CURVES = 1.1, 6.3
 NUM_POSES = 9
 RUN_HEIGHT = HEAD + POSES + 0.5
 HEAD_ONLY, BANNER = 0.75, 0.3  # the words on a run without curves, and those above the comparison
+MIN_LENGTH_M = 1e-9  # less is rounding
 MANY_EDGES = 200  # drawn as thin lines
 MAX_PATHS = 60  # points with a path; more only fill the picture
 
@@ -104,6 +105,8 @@ def _subtitle(report: SimulationReport) -> str:
 
 
 def _length(meters: float) -> str:
+    if 0 < meters < MIN_LENGTH_M:
+        return "<1 nm"
     return f"{format_number(1000 * meters)} mm" if meters < 1 else f"{format_number(meters)} m"
 
 

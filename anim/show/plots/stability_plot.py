@@ -42,9 +42,10 @@ COLORS = {
     "xpbd": "#7b3294",
 }
 SHOWN = ("explicit-euler", "verlet", "implicit-euler", "xpbd")  # drawn as poses: gains, keeps, loses energy
-OWN = "this run's: "  # before the result of the simulation's own method
+OWN = "this run's"  # beside the name of the simulation's own method
 THICK, THIN = 2.0, 1.2
 NUM_POSES = 9
+MIN_CHANGE = 1e-9  # %, of energy; less is rounding
 MAX_SHOWN_GROWTH = 4  # of energy, beyond which a run leaves the picture
 MANY_SPRINGS = 200  # drawn as thin lines without points
 VERLET_LIMIT = 2.0  # ω·h
@@ -86,7 +87,7 @@ def draw_stability(sheet: Figure, compared: Comparison) -> None:
     span = _span(shown, drawn)
     for i, (run, points) in enumerate(zip(shown, drawn, strict=True)):
         place = LEFT - 0.4 + i * width, top, width - 0.15
-        _draw_motion(sheet, run, points, springs, place, span, OWN if run.name == own else "")
+        _draw_motion(sheet, run, points, springs, place, span, f"{OWN}: " if run.name == own else "")
 
 
 def _shown(own: str) -> tuple[str, ...]:
@@ -125,9 +126,11 @@ def _draw_labels(sheet: Figure, runs: Sequence[IntegratorRun], x: float, own: st
     order = sorted(runs, key=lambda run: -(1e9 - run.diverged_at if run.diverged_at else run.energy_change))
     heights = separate_labels([HEAD + 0.1 + 0.44 * i for i in range(len(order))], 0.44, HEAD, HEAD + LOG + CHANGE)
     for run, y in zip(order, heights, strict=True):
-        sheet.text(x, y, run.name, color=COLORS[run.name], weight="bold")
+        wide = sheet.text(x, y, run.name, color=COLORS[run.name], weight="bold")
+        if run.name == own:
+            sheet.text(x + wide + 0.08, y, OWN, fontsize=SMALL, color=SOFT)
         words = f"diverges at {run.diverged_at:.2f} s" if run.diverged_at is not None else _change(run)
-        sheet.text(x, y + 0.15, f"{OWN if run.name == own else ''}{words}", fontsize=SMALL, color=SOFT)
+        sheet.text(x, y + 0.15, words, fontsize=SMALL, color=SOFT)
 
 
 def _keeps_energy(run: IntegratorRun) -> bool:
@@ -142,11 +145,13 @@ def _is_symplectic(name: str) -> bool:
 def _change(run: IntegratorRun) -> str:
     if _keeps_energy(run):
         change = 100 * (run.energies / run.energies[0] - 1)
+        change[np.abs(change) < MIN_CHANGE] = 0.0
         words = f"within {change.min():+.2g} … {change.max():+.2g} %"
     elif run.energy_change > 10:
         words = f"×{format_number(1 + run.energy_change)} after {run.times[-1]:.2g} s"
     else:
-        words = f"{100 * run.energy_change:+.3g} % after {run.times[-1]:.2g} s"
+        change = 100 * run.energy_change
+        words = f"{change if abs(change) >= MIN_CHANGE else 0.0:+.3g} % after {run.times[-1]:.2g} s"
     return words.replace("-", "−")
 
 

@@ -63,3 +63,20 @@ def test_a_mirrored_figure_of_another_build_moves_as_if_it_were_not(
     dots = np.abs((expected.rotation * found.rotation).sum(axis=-1))
     np.testing.assert_allclose(dots[:, 1:], 1.0, atol=1e-6)
     np.testing.assert_allclose(found.translation[:, 1:], expected.translation[:, 1:], atol=1e-5)
+
+
+@pytest.mark.parametrize("build", [1.0, np.array([1.1, 0.9, 1.3, 1.2, 0.8])[:, None]])
+@pytest.mark.parametrize(("scale", "heading"), [((-1, 1, 1), 0.0), ((1, 1, -1), 180.0), ((-2, 2, 2), 0.0)])
+def test_a_flat_mirrored_figure_moves_as_if_it_were_not(
+    scale: tuple[float, float, float], heading: float, build: float | Floats
+) -> None:
+    """Turned by half a turn, it fits without a reflection too: rounding decided which of the two was taken."""
+    flat = OFFSETS * (1, 1, 0)
+    source = ImportedMotion(skeleton(PARENTS, translation=flat), _motion(), frozenset(), 1e-4)
+    turned = _below(abs(scale[0]) * np.ones(3), about("y", [heading])[0], flat * build)
+    targets = [turned, _below(scale, about("y", [0])[0], flat * build)]
+    clips = [apply_to_character(source, Scene(each, ()), aliases={}, nested=True).clip for each in targets]
+    expected, found = (sample_pose(each, moved, TIMES) for each, moved in zip(targets, clips, strict=True))
+    dots = np.abs((expected.rotation * found.rotation).sum(axis=-1))
+    np.testing.assert_allclose(dots[:, 1:], 1.0, atol=1e-6)
+    np.testing.assert_allclose(found.translation[:, 1:], expected.translation[:, 1:], atol=1e-5)
