@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -23,8 +25,10 @@ T = TypeVar("T")
 
 def package() -> tuple[Any, Any, Any]:
     """Return usd-core's Usd, UsdGeom and Vt. Raises UnsupportedError if it is not installed."""
+    is_loaded = "pxr.UsdSkel" in sys.modules  # asked for with every array
     try:
-        with hold_signals():  # what a signal raises while these load is lost, or leaves half of them
+        # What a signal raises while these load is lost, or leaves half of them
+        with nullcontext() if is_loaded else hold_signals():
             from pxr import Gf, Tf, Usd, UsdGeom, UsdSkel, Vt  # noqa: F401
     except ImportError:
         raise UnsupportedError("USD needs the package usd-core", help="pip install 'gltf-anim[usd]'") from None
