@@ -42,6 +42,7 @@ class CacheFormat:
     takes: names of the fields of ReadOptions ("input_fps") and WriteOptions that it supports. holds: "normals",
     "tangents", if it stores them beside positions. files: the files of one cache. check_frames: raises UnsupportedError
     for more frames of so many vertices than it can write, before any is computed; None if they are streamed.
+    up: the axis that is up in all its files, for players; "" for one that has either.
     """
 
     about: str
@@ -52,6 +53,7 @@ class CacheFormat:
     holds: frozenset[str] = frozenset()
     files: Files = Files.ONE
     check_frames: Callable[[int, int, WriteOptions], None] | None = None
+    up: str = ""
 
 
 NORMALS = frozenset(("normals",))
@@ -98,6 +100,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         starts_with(b"Ogawa"),
         frozenset(("source",)),
         NORMALS,
+        up="y",
     ),
     ".glb": CacheFormat(
         "glTF: morph targets or a flip-book",
@@ -107,6 +110,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         GLTF_OPTIONS,
         BOTH,
         check_frames=gltf.check_frames,
+        up="y",
     ),
     ".gltf": CacheFormat(
         "glTF as text, with a .bin",
@@ -117,6 +121,7 @@ CACHE_FORMATS: dict[str, CacheFormat] = {
         BOTH,
         Files.SEVERAL,
         gltf.check_frames,
+        "y",
     ),
     ".exr": _texture(".exr", "vertex animation texture, float (extra exr)", b"\x76\x2f\x31\x01", "preset", "depth"),
     ".png": _texture(".png", "vertex animation texture, 16 bit", b"\x89PNG\r\n\x1a\n", "preset"),

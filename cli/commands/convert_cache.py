@@ -88,7 +88,8 @@ def command(
     file, in world space. If it has several clips, --clip selects that of IN, whose channels of other nodes then stay.
 
     Textures (.exr, .png) get a companion JSON file and mesh. A pipe carries one file: no textures, and only one frame
-    of a sequence. Meshes of a USD may move by points, transforms, skeletons and blend shapes.
+    of a sequence. Meshes of a USD may move by points, transforms, skeletons and blend shapes. One with Z up gets Y up
+    as .glb, .gltf and .abc; without --up, other formats have the up axis of IN.
     """
     reporter = text.Reporter(quiet)
     began = time.perf_counter()
@@ -122,7 +123,7 @@ def command(
             raise UsageError(f"--input-fps does not apply to {loaded.ending}, which stores its frame times")
         if loaded.ending in (".glb", ".gltf"):
             announce_compiling(reporter)
-        cache = _changed(loaded.cache, at, fps, up, vertex_order)
+        cache = _changed(loaded.cache, at, fps, up or CACHE_FORMATS[ending].up, vertex_order)
         if max_error is not None:
             given["max_error"] = units.parse_bound(
                 max_error, "--max-error", lambda: statistics.diagonal(cache), reporter.warn
@@ -168,16 +169,15 @@ def command(
     reporter.info(", ".join(parts) + (" (dry run: nothing written)" if dry_run else ""))
 
 
-def _changed(
-    cache: VertexCache, at: float | None, fps: float | None, up: str | None, chosen: str | None
-) -> VertexCache:
+def _changed(cache: VertexCache, at: float | None, fps: float | None, up: str, chosen: str | None) -> VertexCache:
+    """The cache with other frames, up axis ("" for its own) and vertex order."""
     if at is not None:
         cache = resample.at_time(cache, at)
     if fps is not None:
         cache = resample.at_rate(cache, fps)
     if chosen is not None:
         cache = reorder(cache, str(chosen))
-    return cache if up is None else up_axis.to_up_axis(cache, str(up))
+    return up_axis.to_up_axis(cache, str(up or cache.up))
 
 
 def _counted(cache: VertexCache, progress: Progress) -> VertexCache:

@@ -80,6 +80,35 @@ def test_for_blender(walk: Path, call: Call) -> None:
     assert (np.frombuffer(data[32:], "<f4").reshape(7, 8, 3) == np.stack((x, -z, y), axis=-1)).all()
 
 
+@pytest.mark.parametrize("ending", [".glb", ".gltf"])
+def test_gltf_has_y_up_whatever_the_input_has(ending: str, walk: Path, call: Call) -> None:
+    lying, out, back = (walk.with_name(name) for name in ("z.npz", f"a{ending}", "back.npz"))
+    call("convert-cache", walk, lying, "--up", "z").product()
+    call("convert-cache", lying, out, "--max-error", "0.1mm").product()
+    call("convert-cache", out, back).product()
+    assert positions(back) == pytest.approx(positions(walk), abs=1.1e-4)
+    call("convert-cache", lying, out, "--max-error", "0.1mm", "--up", "z").product()
+    call("convert-cache", out, back).product()
+    assert positions(back) == pytest.approx(positions(lying), abs=1.1e-4)
+
+
+def test_alembic_has_y_up_whatever_the_input_has(walk: Path, call: Call) -> None:
+    pytest.importorskip("alembic3d", reason="alembic3d is not installed")
+    lying, out, same = (walk.with_name(name) for name in ("z.npz", "a.abc", "b.abc"))
+    call("convert-cache", walk, lying, "--up", "z").product()
+    call("convert-cache", lying, out).product()
+    call("convert-cache", walk, same).product()
+    assert out.read_bytes() == same.read_bytes()
+
+
+def test_other_formats_have_the_up_axis_of_the_input(walk: Path, call: Call) -> None:
+    lying, out, back = (walk.with_name(name) for name in ("z.npz", "a.mdd", "back.npz"))
+    call("convert-cache", walk, lying, "--up", "z").product()
+    call("convert-cache", lying, out).product()
+    call("convert-cache", out, back).product()
+    assert (positions(back) == positions(lying)).all()
+
+
 def test_other_frames(walk: Path, call: Call) -> None:
     call("convert-cache", walk, walk.with_name("a.npz"), "--fps", "60").product()
     found, source = positions(walk.with_name("a.npz")), positions(walk)

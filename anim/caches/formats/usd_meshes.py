@@ -115,7 +115,7 @@ class _Stage:
 
     def codes(self) -> Floats:
         """Time codes at which any mesh moves; 0 for a static stage."""
-        return usd_motion.time_codes(self._meshes, self.rate)
+        return usd_motion.time_codes(self._stage, self._meshes)
 
     def faces(self) -> Ints:
         """Triangles (T, 3) of all meshes, counter-clockwise from outside in world space."""

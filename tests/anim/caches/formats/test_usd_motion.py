@@ -45,11 +45,16 @@ BOUND = """rel skel:skeleton = </root/skeleton>
       interpolation = "vertex" )"""
 
 
-def stage(content: str, *, primvars: str = "", codes_per_second: float = 24) -> VertexCache:
+TURNED = SKINNED.replace(
+    "translations.timeSamples = { 0: [(0, 0, 0)], 12: [(0, 3, 0)], 24: [(5, 0, 0)] }", "translations = [(0, 0, 0)]"
+).replace("rotations = [(1, 0, 0, 0)]", "rotations.timeSamples = { 0: [(1, 0, 0, 0)], 24: [(0, 0, 0, 1)] }")
+
+
+def stage(content: str, *, primvars: str = "", codes_per_second: float = 24, frames: str = "") -> VertexCache:
     mesh = TRIANGLE.replace("PRIMVARS", primvars)
     if primvars:
         mesh = mesh.replace('"mesh"', '"mesh" (prepend apiSchemas = ["SkelBindingAPI"])')
-    head = f"( metersPerUnit = 1\n timeCodesPerSecond = {codes_per_second} )"
+    head = f"( metersPerUnit = 1\n timeCodesPerSecond = {codes_per_second}\n {frames} )"
     text = f"#usda 1.0\n{head}\n{content.replace('CHILD', mesh)}\n"
     return opened(Memory("a.usda", {"a.usda": text.encode()}))
 
@@ -77,10 +82,41 @@ def test_transforms_over_endless_time_codes_are_refused() -> None:
 
 def test_a_skeleton_moves_its_mesh() -> None:
     cache = stage(SKINNED, primvars=BOUND)
-    assert cache.times == pytest.approx([0, 0.5, 1])
-    assert positions_of(cache)[:, 1] == pytest.approx(np.array([[1, 0, 0], [1, 3, 0], [6, 0, 0]]))
+    assert cache.times * 24 == pytest.approx(range(25))
+    assert positions_of(cache)[::12, 1] == pytest.approx(np.array([[1, 0, 0], [1, 3, 0], [6, 0, 0]]))
     assert cache.rest is not None
     assert cache.rest[1] == pytest.approx([1, 0, 0])
+
+
+@pytest.mark.parametrize("frames", ["", "startTimeCode = 6\n endTimeCode = 7", "endTimeCode = 1e12"])
+def test_joints_turn_between_their_samples_whatever_frames_the_file_has(frames: str) -> None:
+    cache = stage(TURNED, primvars=BOUND, frames=frames)
+    assert cache.times * 24 == pytest.approx(range(25))
+    angle = np.linspace(0, np.pi, 25)
+    assert positions_of(cache)[:, 1] == pytest.approx(np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1), abs=1e-6)
+
+
+@pytest.mark.parametrize("codes_per_second", [1, 12.5, 23.976, 60])
+def test_joints_and_transforms_have_the_same_frames(codes_per_second: float) -> None:
+    """A joint turns by 180° about z from 0 to 24, and its root by 90° about x from 2 to 20.
+
+    Between frames, as at 2 and 20, the skin is on a straight line.
+    """
+    turn = "float xformOp:rotateX.timeSamples = { 2: 0, 20: 90 }"
+    content = TURNED.replace("CHILD", f'{turn}\n uniform token[] xformOpOrder = ["xformOp:rotateX"]\n CHILD')
+    cache = stage(content, primvars=BOUND, codes_per_second=codes_per_second)
+    codes = cache.times * codes_per_second
+    assert np.diff(codes).max() < min(1, codes_per_second / 24) + 1e-6
+    angle, tilt = np.pi * codes / 24, np.pi / 2 * np.clip((codes - 2) / 18, 0, 1)
+    expected = np.stack([np.cos(angle), np.sin(angle) * np.cos(tilt), np.sin(angle) * np.sin(tilt)], axis=1)
+    off = np.abs(positions_of(cache)[:, 1] - expected).max(axis=1)
+    assert off.max() < 1e-3
+    assert np.count_nonzero(off > 1e-6) <= 2
+
+
+def test_joints_over_endless_time_codes_are_refused() -> None:
+    with pytest.raises(FormatError, match="animated from time code 0 to 1e\\+12"):
+        stage(TURNED.replace("24:", "1000000000000:"), primvars=BOUND)
 
 
 def test_instances_are_read_with_their_own_transforms() -> None:
