@@ -66,7 +66,12 @@ def command(
     bend_compliance: Annotated[
         float, typer.Option("--bend-compliance", metavar="M/N", help="Compliance of hinges; 0 is rigid.")
     ] = 1e-2,
-    damping: Annotated[float, typer.Option("--damping", metavar="N", help="Damping per second.")] = 0.3,
+    damping: Annotated[
+        float,
+        typer.Option(
+            "--damping", metavar="N", help="Damping per second; springs of mass-spring have 2 % of critical besides."
+        ),
+    ] = 0.3,
     gravity: simulation.Gravity = simulation.EARTH_GRAVITY,
     wind: simulation.Wind = "0,0,0",
     gusts: Annotated[
