@@ -146,7 +146,10 @@ def _results(
     start: str,
     progress: Callable[[float], None],
 ) -> dict[int, ClipResult]:
-    """The result of each chosen clip; equal clips are searched once, and those with earlier results not at all."""
+    """The result of each chosen clip; equal clips are searched once, and those with earlier results not at all.
+
+    Clips without tracks are equal: one stands for all, which can be tens of thousands.
+    """
     unsearched = [number for number in chosen if number not in earlier]
     empty = [number for number in unsearched if not optimizer.clips[number].tracks]
     waiting = [number for number in unsearched if optimizer.clips[number].tracks] + empty[:1]

@@ -125,7 +125,8 @@ def scene(
     nodes = json_array(document.json, "nodes")
     instances = []
     parents = hierarchy.parents(document.json) if skeleton is None else skeleton.parents.tolist()
-    for number in depth_first(document.json, parents) if any("mesh" in node for node in nodes) else ():
+    has_meshes = any("mesh" in node for node in nodes)  # files of motion alone have 100 000 nodes to walk through
+    for number in depth_first(document.json, parents) if has_meshes else ():
         node = nodes[number]
         if "mesh" not in node:
             continue
